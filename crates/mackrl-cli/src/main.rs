@@ -1,0 +1,2 @@
+//! The `mackrl` program.
+fn main() {}

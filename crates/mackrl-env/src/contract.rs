@@ -1,0 +1,189 @@
+//! The test that every environment has to pass.
+
+use crate::{
+    Action, AgentId, Draw, EntityId, EntitySet, Environment, EpisodeKey, Observations, Stream,
+};
+
+/// Plays `episodes` episodes with random available actions and checks every promise of [`Environment`] and
+/// [`crate::PriorKnowledge`] at every step.
+///
+/// # Panics
+/// With a sentence that names the broken promise, the episode and the step.
+pub fn check_environment(environment: &mut dyn Environment, episodes: u64) {
+    let spec = environment.spec().clone();
+    let mut observations = Observations::new(&spec, 1);
+    for episode in 0..episodes {
+        let key = EpisodeKey::new(11, Stream::Other, episode);
+        let first = play(environment, key, &mut observations);
+        let again = play(environment, key, &mut observations);
+        assert!(
+            first == again,
+            "{}: episode {episode} differs when repeated",
+            spec.name
+        );
+    }
+}
+
+/// Plays one episode; returns what has to be the same when it is played again.
+fn play(
+    environment: &mut dyn Environment,
+    key: EpisodeKey,
+    observations: &mut Observations,
+) -> (Vec<f32>, Observations) {
+    let spec = environment.spec().clone();
+    let mut rewards = Vec::new();
+    environment.reset(key, &mut observations.row_mut(0));
+    check_observations(
+        environment,
+        observations,
+        &format!("{} after reset", spec.name),
+    );
+    for step in 0..spec.episode_limit {
+        let place = format!("{}, episode {}, step {step}", spec.name, key.episode);
+        check_illegal_action(environment, observations, &place);
+        let actions: Vec<Action> = (0..spec.agents)
+            .map(|agent| random_action(observations, agent, key.uniform(step, Draw::Agent(agent))))
+            .collect();
+        let time_step = environment
+            .step(&actions, &mut observations.row_mut(0))
+            .unwrap_or_else(|error| panic!("{place}: an available action was refused: {error}"));
+        assert!(
+            time_step.reward.is_finite(),
+            "{place}: reward {}",
+            time_step.reward
+        );
+        rewards.push(time_step.reward);
+        check_observations(environment, observations, &place);
+        if time_step.end.is_some() {
+            return (rewards, observations.clone());
+        }
+    }
+    panic!(
+        "{}: an episode runs beyond its limit of {} steps",
+        spec.name, spec.episode_limit
+    );
+}
+
+fn random_action(observations: &Observations, agent: usize, uniform: f64) -> Action {
+    let view = observations.local_view(0, AgentId::new(agent));
+    let available: Vec<usize> = (0..view.available().len())
+        .filter(|&a| view.available()[a])
+        .collect();
+    let choice = (uniform * available.len() as f64).floor();
+    let index = (0..available.len())
+        .rev()
+        .find(|&i| i as f64 <= choice)
+        .unwrap_or(0);
+    Action::new(available[index])
+}
+
+fn check_observations(environment: &dyn Environment, observations: &Observations, place: &str) {
+    let spec = environment.spec();
+    let prior = environment.prior_knowledge();
+    assert!(
+        observations.state(0).iter().all(|x| x.is_finite()),
+        "{place}: the state holds a number that is not finite"
+    );
+    let everything = EntitySet::first(spec.entities);
+    for agent in (0..spec.agents).map(AgentId::new) {
+        let view = observations.local_view(0, agent);
+        let seen = view.seen();
+        assert!(
+            view.observation().iter().all(|x| x.is_finite()),
+            "{place}: the observation of agent {agent} holds a number that is not finite"
+        );
+        assert!(
+            view.available().contains(&true),
+            "{place}: agent {agent} has no available action"
+        );
+        assert!(
+            seen.set().is_subset_of(everything),
+            "{place}: agent {agent} sees beyond M"
+        );
+        let Some(own) = seen.get(agent) else {
+            assert!(
+                seen.set().is_empty(),
+                "{place}: agent {agent} sees others but not itself"
+            );
+            continue;
+        };
+        for entity in (0..spec.entities).map(EntityId::new) {
+            // Whom nobody sees is dead or hidden from all; the mask speaks only of entities with features.
+            let Some(features) = (0..spec.agents)
+                .map(AgentId::new)
+                .find_map(|other| observations.local_view(0, other).seen().get(entity))
+            else {
+                continue;
+            };
+            assert_eq!(
+                prior.sees(agent, own, entity, features),
+                seen.set().contains(entity),
+                "{place}: what agent {agent} sees of entity {entity} differs from its mask"
+            );
+        }
+        check_availability(environment, observations, agent, place);
+    }
+}
+
+fn check_availability(
+    environment: &dyn Environment,
+    observations: &Observations,
+    agent: AgentId,
+    place: &str,
+) {
+    let spec = environment.spec();
+    let prior = environment.prior_knowledge();
+    let view = observations.local_view(0, agent);
+    let mut known = vec![false; spec.actions];
+    prior.available(view.seen(), agent, &mut known);
+    assert_eq!(
+        known,
+        view.available(),
+        "{place}: availability of agent {agent} by its own view"
+    );
+    for entity in view.seen().set().iter() {
+        let fewer = view.seen().set().difference([entity].into_iter().collect());
+        prior.available(view.seen().restricted_to(fewer), agent, &mut known);
+        let subset = known
+            .iter()
+            .zip(view.available())
+            .all(|(known, truth)| !known || *truth);
+        assert!(
+            subset,
+            "{place}: knowing less made an action of agent {agent} available"
+        );
+    }
+}
+
+fn check_illegal_action(
+    environment: &mut dyn Environment,
+    observations: &mut Observations,
+    place: &str,
+) {
+    let spec = environment.spec().clone();
+    let first_available = |agent| random_action(observations, agent, 0.0);
+    let mut actions: Vec<Action> = (0..spec.agents).map(first_available).collect();
+    let unavailable = (0..spec.agents).rev().find_map(|agent| {
+        let available = observations.local_view(0, AgentId::new(agent)).available();
+        available
+            .iter()
+            .position(|available| !available)
+            .map(|action| (agent, action))
+    });
+    let Some((agent, action)) = unavailable else {
+        return;
+    };
+    actions[agent] = Action::new(action);
+    let refused = environment.step(&actions, &mut observations.row_mut(0));
+    let error = refused.expect_err("an unavailable action is refused");
+    assert_eq!(
+        error.agent,
+        AgentId::new(agent),
+        "{place}: the wrong agent is named"
+    );
+    assert_eq!(
+        error.action,
+        Action::new(action),
+        "{place}: the wrong action is named"
+    );
+}

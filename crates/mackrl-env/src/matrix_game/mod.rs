@@ -1,0 +1,1 @@
+//! The matrix game of the paper: two agents, five actions, one step.

@@ -1,0 +1,1 @@
+//! StarCraft micromanagement: the rules of battle and their reinforcement-learning face.

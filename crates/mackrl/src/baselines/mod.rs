@@ -1,0 +1,1 @@
+//! Central-V and independent actors: the learners that MACKRL is measured against.

@@ -1,0 +1,1 @@
+//! The controllers of pairwise MACKRL and the sampler that walks down them.

@@ -1,0 +1,1 @@
+//! On-policy actor-critic learning from the marginal probability of the joint action.

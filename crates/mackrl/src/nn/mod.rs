@@ -1,0 +1,1 @@
+//! The numerical core: small layers with explicit backward passes.

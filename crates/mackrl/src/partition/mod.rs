@@ -1,0 +1,1 @@
+//! Partitions of a team into pairs with at most one singleton.

@@ -1,0 +1,1 @@
+//! What acting and learning share: the tables of one step's log-probabilities.

@@ -1,0 +1,1 @@
+//! Episodes of parallel environments, stored once for the learner.

@@ -1,0 +1,1 @@
+//! The matrix game's learners with exact gradients (Figure 5).

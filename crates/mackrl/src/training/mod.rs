@@ -1,0 +1,1 @@
+//! The training loop: rollout, learner, tests and metrics.
