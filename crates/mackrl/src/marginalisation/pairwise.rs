@@ -1,0 +1,225 @@
+//! The marginal likelihood of pairwise MACKRL in closed form.
+//!
+//! Given a partition, its pairs act independently, so the sum over paths factorises: two ways for each pair, a product over
+//! pairs, a sum over partitions. A product of many probabilities leaves the range of `f32` (24 agents that choose evenly
+//! among 36 actions: e⁻⁸⁶, at its very edge; a sharper policy: far below), so everything stays in logarithms.
+
+use mackrl_env::{Action, AgentId};
+
+use crate::{
+    Real,
+    partition::{Pair, Partition},
+    policy::{DELEGATE, PolicyShape, PolicyTable},
+};
+
+/// d log p(u) / d log π for every table entry that the joint action u touches; all other entries have none.
+///
+/// Every number is a posterior probability given u, in [0, 1]. If p(u) = 0 there is no gradient, and all are 0.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MarginalGradient<F> {
+    /// For each partition \[P\]: that it was chosen. Sums to 1.
+    pub selector_p: Vec<F>,
+    /// For each pair \[K\]: that it was formed and acted jointly. Belongs to the column of (u_a, u_b).
+    pub joint_k: Vec<F>,
+    /// For each pair \[K\]: that it was formed and delegated. Belongs to the column [`DELEGATE`].
+    pub delegate_k: Vec<F>,
+    /// For each agent \[N\]: that it acted alone. Belongs to the column u_a.
+    pub agent_n: Vec<F>,
+    /// Factors of the pairs in force \[K\], and whether they have been computed.
+    factor_k: Vec<Option<PairFactor<F>>>,
+}
+
+/// One pair's factor of p(u | partition): the joint way plus the delegated way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct PairFactor<F> {
+    /// log( π_pc(u_a, u_b) + π_pc(d)·π_a(u_a)·π_b(u_b) )
+    log_p: F,
+    /// Share of the first term, in [0, 1].
+    joint_share: F,
+    /// Share of the second term.
+    delegate_share: F,
+}
+
+impl<F: Real> MarginalGradient<F> {
+    /// Room for `partitions` partitions in force.
+    #[must_use]
+    pub fn new(shape: PolicyShape, partitions: usize) -> Self {
+        let zeros = |count| vec![F::ZERO; count];
+        Self {
+            selector_p: zeros(partitions),
+            joint_k: zeros(shape.pairs()),
+            delegate_k: zeros(shape.pairs()),
+            agent_n: zeros(shape.agents),
+            factor_k: vec![None; shape.pairs()],
+        }
+    }
+
+    /// Forgets everything and takes the sizes of `table`; allocates only to grow.
+    fn reset(&mut self, table: &PolicyTable<'_, F>) {
+        let zero = |weights: &mut Vec<F>, count| {
+            weights.clear();
+            weights.resize(count, F::ZERO);
+        };
+        let shape = table.shape();
+        zero(&mut self.selector_p, table.partitions().len());
+        zero(&mut self.joint_k, shape.pairs());
+        zero(&mut self.delegate_k, shape.pairs());
+        zero(&mut self.agent_n, shape.agents);
+        self.factor_k.clear();
+        self.factor_k.resize(shape.pairs(), None);
+    }
+}
+
+/// log p(u), the log-probability that the hierarchy of `table` ends in the joint action `actions_n`.
+///
+/// −∞ if no path leads there.
+///
+/// # Shapes
+/// `actions_n` \[N\].
+///
+/// # Equation
+/// log p(u) = LSE_P \[ log π_ps(P) + Σ_{ {a,b} ∈ P } LSE( log π_pc(u_a, u_b), log π_pc(d) + log π_a(u_a) + log π_b(u_b) )
+/// + Σ_{singleton c} log π_c(u_c) \], eq. (5) for the pairwise hierarchy.
+#[must_use]
+pub fn log_likelihood<F: Real>(table: &PolicyTable<'_, F>, actions_n: &[Action]) -> F {
+    debug_assert_eq!(
+        actions_n.len(),
+        table.shape().agents,
+        "one action per agent"
+    );
+    let terms = table
+        .partitions()
+        .iter()
+        .zip(table.selector())
+        .map(|(partition, &log_p)| {
+            let factor = |pair: &Pair| pair_factor(table, *pair, actions_n).log_p;
+            log_p + log_p_given(table, partition, actions_n, factor)
+        });
+    log_sum_exp(terms)
+}
+
+/// [`log_likelihood`], and its derivative with respect to every entry of the table, written to `gradient`.
+///
+/// Allocates nothing once `gradient` has had the table's sizes.
+///
+/// # Shapes
+/// `actions_n` \[N\].
+///
+/// # Equation
+/// With w_P the posterior of partition P, r_k = Σ_{P ∋ k} w_P that of pair k, and δ_k the share of delegation in the pair's
+/// factor: ∂/∂log π_ps(P) = w_P; ∂/∂log π_pc(u_a, u_b) = r_k·(1 − δ_k); ∂/∂log π_pc(d) = r_k·δ_k;
+/// ∂/∂log π_a(u_a) = Σ_{k ∋ a} r_k·δ_k + Σ_{P leaves a alone} w_P.
+pub fn log_likelihood_with_gradient<F: Real>(
+    table: &PolicyTable<'_, F>,
+    actions_n: &[Action],
+    gradient: &mut MarginalGradient<F>,
+) -> F {
+    debug_assert_eq!(
+        actions_n.len(),
+        table.shape().agents,
+        "one action per agent"
+    );
+    gradient.reset(table);
+    let MarginalGradient {
+        selector_p,
+        factor_k,
+        ..
+    } = gradient;
+    for ((term, partition), &log_p) in selector_p
+        .iter_mut()
+        .zip(table.partitions())
+        .zip(table.selector())
+    {
+        let factor = |pair: &Pair| {
+            factor_k[pair.index()]
+                .get_or_insert_with(|| pair_factor(table, *pair, actions_n))
+                .log_p
+        };
+        *term = log_p + log_p_given(table, partition, actions_n, factor);
+    }
+    let log_p = log_sum_exp(selector_p.iter().copied());
+    for term in selector_p {
+        *term = share(*term, log_p);
+    }
+    distribute(table, gradient);
+    log_p
+}
+
+/// Passes the posteriors of the partitions, in `selector_p`, down to pairs and agents.
+fn distribute<F: Real>(table: &PolicyTable<'_, F>, gradient: &mut MarginalGradient<F>) {
+    // `joint_k` collects the posteriors of the pairs before they are split.
+    for (partition, &posterior) in table.partitions().iter().zip(&gradient.selector_p) {
+        for pair in partition.pairs() {
+            gradient.joint_k[pair.index()] += posterior;
+        }
+        if let Some(agent) = partition.singleton() {
+            gradient.agent_n[agent.index()] += posterior;
+        }
+    }
+    for partition in table.partitions() {
+        for pair in partition.pairs() {
+            let k = pair.index();
+            // Taken, so that a pair of several partitions is split once.
+            let Some(factor) = gradient.factor_k[k].take() else {
+                continue;
+            };
+            let posterior = gradient.joint_k[k];
+            gradient.joint_k[k] = posterior * factor.joint_share;
+            gradient.delegate_k[k] = posterior * factor.delegate_share;
+            for agent in pair.agents() {
+                gradient.agent_n[agent.index()] += gradient.delegate_k[k];
+            }
+        }
+    }
+}
+
+/// log p(u | `partition`), given each pair's log factor.
+fn log_p_given<F: Real>(
+    table: &PolicyTable<'_, F>,
+    partition: &Partition,
+    actions_n: &[Action],
+    log_factor: impl FnMut(&Pair) -> F,
+) -> F {
+    let alone = partition.singleton().map_or(F::ZERO, |agent| {
+        table.agent(agent.index())[actions_n[agent.index()].index()]
+    });
+    partition.pairs().iter().map(log_factor).sum::<F>() + alone
+}
+
+fn pair_factor<F: Real>(
+    table: &PolicyTable<'_, F>,
+    pair: Pair,
+    actions_n: &[Action],
+) -> PairFactor<F> {
+    let [a, b] = pair.agents().map(AgentId::index);
+    let log_p_c = table.pair(pair.index());
+    let joint = log_p_c[table.shape().column(actions_n[a], actions_n[b])];
+    let delegated = log_p_c[DELEGATE]
+        + table.agent(a)[actions_n[a].index()]
+        + table.agent(b)[actions_n[b].index()];
+    let log_p = log_sum_exp([joint, delegated]);
+    PairFactor {
+        log_p,
+        joint_share: share(joint, log_p),
+        delegate_share: share(delegated, log_p),
+    }
+}
+
+/// e^{term − total}: the share of a term in a sum, both in logarithms; 0 if the sum is empty of probability.
+fn share<F: Real>(term: F, total: F) -> F {
+    if term > F::NEG_INFINITY {
+        (term - total).exp()
+    } else {
+        F::ZERO
+    }
+}
+
+/// log Σ e^{x}, −∞ if there is no probability. A sum with one term that is not −∞ is that term, to the bit.
+fn log_sum_exp<F: Real>(terms: impl IntoIterator<Item = F, IntoIter: Clone>) -> F {
+    let terms = terms.into_iter();
+    let largest = terms.clone().fold(F::NEG_INFINITY, F::max);
+    if largest == F::NEG_INFINITY {
+        return largest;
+    }
+    largest + terms.map(|term| (term - largest).exp()).sum::<F>().ln()
+}

@@ -1,0 +1,196 @@
+//! The general hierarchy of eq. (4), Algorithm 1 and eq. (5), written to be read.
+//!
+//! A [`Controller`] governs a group. It either acts for the whole group or divides it into smaller groups, each with a
+//! controller of its own. Groups, depths and partitions are arbitrary; a hierarchy is a plain tree of probabilities in
+//! `f64`. Its cost is exponential in every respect: it exists so that [`super::log_likelihood`] can be tested against it.
+
+use mackrl_env::{Action, AgentId};
+
+use crate::policy::{DELEGATE, PolicyTable};
+
+/// An assignment of actions to some of the agents.
+pub type Assignment = Vec<(AgentId, Action)>;
+
+/// π^𝒢 at one step: a distribution over 𝓤_𝒢 = 𝓤_env^𝒢 ∪ 𝓟(𝒢), eq. (4).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Controller {
+    /// The possible choices with their probabilities, which sum to 1.
+    pub choices: Vec<(f64, Choice)>,
+}
+
+/// What the controller of a group can choose.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Choice {
+    /// A joint action: an action for each member of the group.
+    Act(Assignment),
+    /// A partition: a controller for each part of the group.
+    Divide(Vec<Controller>),
+}
+
+/// A possible outcome of Algorithm 1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Path {
+    /// p(path | s): the product of the probabilities of all choices on the path.
+    pub probability: f64,
+    /// The joint action in which the path ends.
+    pub assignment: Assignment,
+}
+
+impl Controller {
+    /// A controller of `agent` alone with the action probabilities `p_a` \[A\].
+    #[must_use]
+    pub fn of_agent(agent: AgentId, p_a: &[f64]) -> Self {
+        let act = |action| Choice::Act(vec![(agent, Action::new(action))]);
+        Self {
+            choices: p_a
+                .iter()
+                .enumerate()
+                .map(|(action, &p)| (p, act(action)))
+                .collect(),
+        }
+    }
+
+    /// The pairwise hierarchy of `table`: pair selector, pair controllers and agent controllers as a tree of three levels.
+    #[must_use]
+    pub fn pairwise(table: &PolicyTable<'_, f64>) -> Self {
+        let agent_controller = |agent: AgentId| {
+            let p_a: Vec<f64> = table.agent(agent.index()).iter().map(|x| x.exp()).collect();
+            Self::of_agent(agent, &p_a)
+        };
+        let choices = table
+            .partitions()
+            .iter()
+            .zip(table.selector())
+            .map(|(partition, log_p)| {
+                let pairs = partition.pairs().iter().map(|pair| {
+                    let delegate = Choice::Divide(pair.agents().map(agent_controller).into());
+                    Self::of_pair(pair.agents(), table.pair(pair.index()), &delegate, table)
+                });
+                let alone = partition.singleton().map(agent_controller);
+                (log_p.exp(), Choice::Divide(pairs.chain(alone).collect()))
+            })
+            .collect();
+        Self { choices }
+    }
+
+    fn of_pair(
+        members: [AgentId; 2],
+        log_p_c: &[f64],
+        delegate: &Choice,
+        table: &PolicyTable<'_, f64>,
+    ) -> Self {
+        let choice = |column| match table.shape().joint_action(column) {
+            Some(actions) => Choice::Act(members.into_iter().zip(actions).collect()),
+            None => delegate.clone(),
+        };
+        debug_assert!(
+            table.shape().joint_action(DELEGATE).is_none(),
+            "column 0 delegates"
+        );
+        Self {
+            choices: log_p_c
+                .iter()
+                .enumerate()
+                .map(|(column, log_p)| (log_p.exp(), choice(column)))
+                .collect(),
+        }
+    }
+
+    /// Every path through this controller and those below it.
+    #[must_use]
+    pub fn paths(&self) -> Vec<Path> {
+        self.choices
+            .iter()
+            .flat_map(|(probability, choice)| {
+                choice.paths().into_iter().map(move |path| Path {
+                    probability: probability * path.probability,
+                    assignment: path.assignment,
+                })
+            })
+            .collect()
+    }
+
+    /// p(u | s), eq. (5): Σ_path p(u | s, path)·p(path | s), where p(u | s, path) is 1 if the path ends in u and else 0.
+    ///
+    /// # Shapes
+    /// `actions_n` \[N\].
+    #[must_use]
+    pub fn probability(&self, actions_n: &[Action]) -> f64 {
+        self.paths()
+            .iter()
+            .filter(|path| {
+                path.assignment
+                    .iter()
+                    .all(|&(agent, action)| actions_n[agent.index()] == action)
+            })
+            .map(|path| path.probability)
+            .sum()
+    }
+
+    /// Algorithm 1: samples a choice, and then below it, until every agent has an action. Each call of `uniform` gives a
+    /// number in [0, 1).
+    ///
+    /// # Panics
+    /// If a controller has no choice with a probability above 0.
+    pub fn sample(&self, uniform: &mut impl FnMut() -> f64) -> Assignment {
+        let mut rest = uniform();
+        let mut possible = self.choices.iter().filter(|(p, _)| *p > 0.0).peekable();
+        loop {
+            let (p, choice) = possible.next().expect("a controller has a possible choice");
+            rest -= p;
+            if rest >= 0.0 && possible.peek().is_some() {
+                continue;
+            }
+            return match choice {
+                Choice::Act(assignment) => assignment.clone(),
+                Choice::Divide(parts) => {
+                    let mut assignment = Assignment::new();
+                    for part in parts {
+                        assignment.extend(part.sample(uniform));
+                    }
+                    assignment
+                }
+            };
+        }
+    }
+}
+
+impl Choice {
+    /// Every path below this choice: one for a joint action, all combinations of the parts' paths for a partition.
+    fn paths(&self) -> Vec<Path> {
+        match self {
+            Self::Act(assignment) => vec![Path {
+                probability: 1.0,
+                assignment: assignment.clone(),
+            }],
+            Self::Divide(parts) => {
+                let nothing = Path {
+                    probability: 1.0,
+                    assignment: Assignment::new(),
+                };
+                parts.iter().fold(vec![nothing], |paths, part| {
+                    let part_paths = part.paths();
+                    paths
+                        .iter()
+                        .flat_map(|path| part_paths.iter().map(|next| path.then(next)))
+                        .collect()
+                })
+            }
+        }
+    }
+}
+
+impl Path {
+    /// Both paths, taken by disjoint groups that choose independently.
+    fn then(&self, other: &Self) -> Self {
+        Self {
+            probability: self.probability * other.probability,
+            assignment: self
+                .assignment
+                .iter()
+                .chain(&other.assignment)
+                .copied()
+                .collect(),
+        }
+    }
+}
