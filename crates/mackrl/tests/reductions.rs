@@ -1,0 +1,176 @@
+//! Special cases of the hierarchy equal simpler algorithms.
+
+mod support;
+
+use mackrl::{
+    marginalisation::{MarginalGradient, log_likelihood, log_likelihood_with_gradient},
+    partition::{PartitionBuffer, PartitionSchedule, all_partitions},
+    policy::{DELEGATE, PolicyTable},
+};
+use mackrl_env::{EpisodeKey, Stream};
+use support::{MASKED, Tables, assert_close};
+
+/// Σ_a log π_a(u_a), in the order in which a partition names the agents.
+fn independent(tables: &Tables, actions_n: &[mackrl_env::Action]) -> f64 {
+    let table = tables.table();
+    let agent = |n: usize| table.agent(n)[actions_n[n].index()];
+    let partition = &tables.partitions[0];
+    let pairs: f64 = partition
+        .pairs()
+        .iter()
+        .map(|pair| {
+            let [a, b] = pair.agents();
+            agent(a.index()) + agent(b.index())
+        })
+        .sum();
+    pairs + partition.singleton().map_or(0.0, |c| agent(c.index()))
+}
+
+#[test]
+fn delegating_always_equals_independent_agents_exactly() {
+    for agents in 1..=5 {
+        for partition in all_partitions(agents) {
+            let tables = Tables::random_with(3, 3, vec![partition]).always_delegating();
+            for actions_n in tables.joint_actions() {
+                let expected = independent(&tables, &actions_n);
+                assert_eq!(tables.log_likelihood(&actions_n), expected);
+                let gradient = tables.gradient(&actions_n);
+                let weight = if expected > MASKED { 1.0 } else { 0.0 };
+                assert!(
+                    gradient.agent_n.iter().all(|&w| w == weight),
+                    "{gradient:?}"
+                );
+                assert!(gradient.joint_k.iter().all(|&w| w == 0.0), "{gradient:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn delegating_always_equals_independent_agents_whatever_the_selector_does() {
+    for agents in 3..=5 {
+        let tables = Tables::random(5, agents, 2).always_delegating();
+        for actions_n in tables.joint_actions() {
+            let expected = independent(&tables, &actions_n);
+            if expected > MASKED {
+                assert_close(tables.log_likelihood(&actions_n), expected, 1e-14);
+                for weight in tables.gradient(&actions_n).agent_n {
+                    assert_close(weight, 1.0, 1e-14);
+                }
+            } else {
+                assert_eq!(tables.log_likelihood(&actions_n), MASKED);
+            }
+        }
+    }
+}
+
+#[test]
+fn never_delegating_with_one_pair_equals_a_joint_learner_exactly() {
+    let tables = Tables::random(7, 2, 5).never_delegating(11);
+    for actions_n in tables.joint_actions() {
+        let column = tables.shape.column(actions_n[0], actions_n[1]);
+        assert_eq!(
+            tables.log_likelihood(&actions_n),
+            tables.log_p_pair_kc[column]
+        );
+        let gradient = tables.gradient(&actions_n);
+        assert_eq!(gradient.joint_k, [1.0]);
+        assert_eq!(gradient.delegate_k, [0.0]);
+        assert_eq!(gradient.agent_n, [0.0, 0.0]);
+    }
+}
+
+#[test]
+fn a_team_of_one_acts_on_its_own_policy() {
+    let tables = Tables::random(2, 1, 7);
+    for actions_n in tables.joint_actions() {
+        let expected = tables.log_p_agent_na[actions_n[0].index()];
+        assert_eq!(tables.log_likelihood(&actions_n), expected);
+    }
+}
+
+#[test]
+fn one_partition_makes_the_likelihood_a_product_over_its_pairs() {
+    let plan = PartitionSchedule::RoundRobin
+        .plan(7, 1)
+        .expect("any team can play");
+    let key = EpisodeKey::new(1, Stream::Training, 3);
+    let mut buffer = PartitionBuffer::default();
+    for step in 0..7 {
+        let partitions = plan.in_force(&key, step, &mut buffer).to_vec();
+        let tables = Tables::random_with(step as u64, 2, partitions);
+        let table = tables.table();
+        for actions_n in tables.joint_actions() {
+            let p = |n: usize| table.agent(n)[actions_n[n].index()].exp();
+            let mut product = 1.0;
+            for pair in tables.partitions[0].pairs() {
+                let [a, b] = pair.agents().map(mackrl_env::AgentId::index);
+                let row = table.pair(pair.index());
+                let joint = row[tables.shape.column(actions_n[a], actions_n[b])].exp();
+                product *= joint + row[DELEGATE].exp() * p(a) * p(b);
+            }
+            if let Some(alone) = tables.partitions[0].singleton() {
+                product *= p(alone.index());
+            }
+            assert_close(tables.log_likelihood(&actions_n).exp(), product, 1e-14);
+        }
+    }
+}
+
+#[test]
+fn a_pair_outside_every_partition_in_force_is_never_read() {
+    let mut tables = Tables::random_with(3, 3, all_partitions(4)[..1].to_vec());
+    let actions_n = (tables.joint_actions().into_iter())
+        .find(|actions_n| tables.log_likelihood(actions_n) > MASKED)
+        .expect("some joint action is possible");
+    let expected = (
+        tables.log_likelihood(&actions_n),
+        tables.gradient(&actions_n),
+    );
+    let columns = tables.shape.columns();
+    let in_force: Vec<usize> = (tables.partitions[0].pairs().iter())
+        .map(|pair| pair.index())
+        .collect();
+    for (k, row) in tables.log_p_pair_kc.chunks_mut(columns).enumerate() {
+        if !in_force.contains(&k) {
+            row.fill(f64::NAN);
+        }
+    }
+    let found = (
+        tables.log_likelihood(&actions_n),
+        tables.gradient(&actions_n),
+    );
+    assert_eq!(found, expected);
+}
+
+#[test]
+fn single_precision_gives_the_same_numbers_with_fewer_digits() {
+    let tables = Tables::random(13, 5, 3);
+    let single =
+        |row: &[f64]| -> Vec<f32> { row.iter().map(|&x| mackrl::Real::from_f64(x)).collect() };
+    let (selector, pair, agent) = (
+        single(&tables.log_p_selector_p),
+        single(&tables.log_p_pair_kc),
+        single(&tables.log_p_agent_na),
+    );
+    let table = PolicyTable::new(tables.shape, &tables.partitions, &selector, &pair, &agent)
+        .expect("as in double precision");
+    let mut gradient = MarginalGradient::new(tables.shape, 0);
+    for actions_n in tables.joint_actions() {
+        let expected = tables.log_likelihood(&actions_n);
+        let log_p = log_likelihood_with_gradient(&table, &actions_n, &mut gradient);
+        assert_eq!(log_p, log_likelihood(&table, &actions_n));
+        if expected == MASKED {
+            assert_eq!(log_p, f32::NEG_INFINITY);
+            continue;
+        }
+        assert_close(f64::from(log_p), expected, 1e-6);
+        for (found, expected) in gradient
+            .agent_n
+            .iter()
+            .zip(tables.gradient(&actions_n).agent_n)
+        {
+            assert_close(f64::from(*found), expected, 1e-5);
+        }
+    }
+}
