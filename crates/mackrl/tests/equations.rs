@@ -242,7 +242,7 @@ fn equation_5_the_marginal_is_the_sum_over_partitions_and_delegations() {
     }
 }
 
-/// Σ_path p(u | path)·p(path): a path is a partition and, for each of its pairs, whether the pair delegated.
+/// `Σ_path p(u | path)·p(path)`: a path is a partition and, for each of its pairs, whether the pair delegated.
 fn sum_over_paths(tables: &Tables, actions_n: &[Action]) -> f64 {
     let of_agent = |a: AgentId| tables.agent_row(a)[actions_n[a.index()].index()].exp();
     let mut total = 0.0;

@@ -10,7 +10,7 @@ use mackrl::{
 use mackrl_env::{EpisodeKey, Stream};
 use support::{MASKED, Tables, assert_close};
 
-/// Σ_a log π_a(u_a), in the order in which a partition names the agents.
+/// `Σ_a log π_a(u_a)`, in the order in which a partition names the agents.
 fn independent(tables: &Tables, actions_n: &[mackrl_env::Action]) -> f64 {
     let table = tables.table();
     let agent = |n: usize| table.agent(n)[actions_n[n].index()];

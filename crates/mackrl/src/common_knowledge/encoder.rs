@@ -256,7 +256,7 @@ impl fmt::Debug for GroupEncoder {
 /// commonly known to be available.
 ///
 /// # Shapes
-/// `available_ga` \[2, A\]; `mask_c` \[1 + A·A\], column 1 + u_a·A + u_b for the joint action (u_a, u_b).
+/// `available_ga` \[2, A\]; `mask_c` \[1 + A·A\], column `1 + u_a·A + u_b` for the joint action `(u_a, u_b)`.
 ///
 /// # Panics
 /// If the lengths do not fit each other.

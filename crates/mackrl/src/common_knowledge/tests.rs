@@ -207,7 +207,7 @@ fn battle(case: usize) -> (Plain, Vec<f32>, Vec<EntitySet>) {
         .map(|i| 8.0 * real(uniform(Draw::World(i))))
         .collect();
     let mut visible_n = plain.visible(&entity_mf);
-    if case % 3 == 0 {
+    if case.is_multiple_of(3) {
         let dead = EntitySet::from_bits(1 << (case % agents));
         visible_n[case % agents] = EntitySet::EMPTY;
         visible_n

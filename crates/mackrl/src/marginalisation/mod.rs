@@ -5,7 +5,7 @@
 //! gradient with respect to every log-probability is a posterior weight.
 //!
 //! [`log_likelihood`] and [`log_likelihood_with_gradient`] do this for the pairwise hierarchy, in log space and without
-//! allocation. [`reference`] is the general hierarchy of eq. (4) with any groups, written as literally as possible, to test
+//! allocation. [`reference`](mod@reference) is the general hierarchy of eq. (4) with any groups, written as literally as possible, to test
 //! them against.
 
 mod pairwise;

@@ -19,11 +19,11 @@ use crate::{
 pub struct MarginalGradient<F> {
     /// For each partition \[P\]: that it was chosen. Sums to 1.
     pub selector_p: Vec<F>,
-    /// For each pair \[K\]: that it was formed and acted jointly. Belongs to the column of (u_a, u_b).
+    /// For each pair \[K\]: that it was formed and acted jointly. Belongs to the column of `(u_a, u_b)`.
     pub joint_k: Vec<F>,
     /// For each pair \[K\]: that it was formed and delegated. Belongs to the column [`DELEGATE`].
     pub delegate_k: Vec<F>,
-    /// For each agent \[N\]: that it acted alone. Belongs to the column u_a.
+    /// For each agent \[N\]: that it acted alone. Belongs to the column `u_a`.
     pub agent_n: Vec<F>,
     /// Factors of the pairs in force \[K\], and whether they have been computed.
     factor_k: Vec<Option<PairFactor<F>>>,
@@ -32,7 +32,7 @@ pub struct MarginalGradient<F> {
 /// One pair's factor of p(u | partition): the joint way plus the delegated way.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct PairFactor<F> {
-    /// log( π_pc(u_a, u_b) + π_pc(d)·π_a(u_a)·π_b(u_b) )
+    /// `log( π_pc(u_a, u_b) + π_pc(d)·π_a(u_a)·π_b(u_b) )`
     log_p: F,
     /// Share of the first term, in [0, 1].
     joint_share: F,
@@ -78,8 +78,13 @@ impl<F: Real> MarginalGradient<F> {
 /// `actions_n` \[N\].
 ///
 /// # Equation
-/// log p(u) = LSE_P \[ log π_ps(P) + Σ_{ {a,b} ∈ P } LSE( log π_pc(u_a, u_b), log π_pc(d) + log π_a(u_a) + log π_b(u_b) )
-/// + Σ_{singleton c} log π_c(u_c) \], eq. (5) for the pairwise hierarchy.
+/// Eq. (5) for the pairwise hierarchy:
+///
+/// ```text
+/// log p(u) = LSE_P [ log π_ps(P)
+///                  + Σ_{ {a,b} ∈ P } LSE( log π_pc(u_a, u_b), log π_pc(d) + log π_a(u_a) + log π_b(u_b) )
+///                  + Σ_{singleton c of P} log π_c(u_c) ]
+/// ```
 #[must_use]
 pub fn log_likelihood<F: Real>(table: &PolicyTable<'_, F>, actions_n: &[Action]) -> F {
     debug_assert_eq!(
@@ -106,9 +111,14 @@ pub fn log_likelihood<F: Real>(table: &PolicyTable<'_, F>, actions_n: &[Action])
 /// `actions_n` \[N\].
 ///
 /// # Equation
-/// With w_P the posterior of partition P, r_k = Σ_{P ∋ k} w_P that of pair k, and δ_k the share of delegation in the pair's
-/// factor: ∂/∂log π_ps(P) = w_P; ∂/∂log π_pc(u_a, u_b) = r_k·(1 − δ_k); ∂/∂log π_pc(d) = r_k·δ_k;
-/// ∂/∂log π_a(u_a) = Σ_{k ∋ a} r_k·δ_k + Σ_{P leaves a alone} w_P.
+/// With `w_P` the posterior of partition P, `r_k` that of pair k and `δ_k` the share of delegation in the pair's factor:
+///
+/// ```text
+/// w_P = π_ps(P)·p(u | P) / p(u)                    ∂ log p(u) / ∂ log π_ps(P)         = w_P
+/// r_k = Σ_{P ∋ k} w_P                              ∂ log p(u) / ∂ log π_pc(u_a, u_b)  = r_k·(1 − δ_k)
+/// δ_k = π_pc(d)·π_a(u_a)·π_b(u_b) / p(u_a, u_b)    ∂ log p(u) / ∂ log π_pc(d)         = r_k·δ_k
+///                                                  ∂ log p(u) / ∂ log π_a(u_a)        = Σ_{k ∋ a} r_k·δ_k + Σ_{P leaves a alone} w_P
+/// ```
 pub fn log_likelihood_with_gradient<F: Real>(
     table: &PolicyTable<'_, F>,
     actions_n: &[Action],

@@ -6,12 +6,13 @@
 
 use mackrl_env::{Action, AgentId};
 
-use crate::policy::{DELEGATE, PolicyTable};
+use crate::policy::PolicyTable;
 
 /// An assignment of actions to some of the agents.
 pub type Assignment = Vec<(AgentId, Action)>;
 
-/// π^𝒢 at one step: a distribution over 𝓤_𝒢 = 𝓤_env^𝒢 ∪ 𝓟(𝒢), eq. (4).
+/// π^𝒢 at one step, eq. (4): a distribution over the joint actions of the group and its partitions,
+/// `𝓤_𝒢 = 𝓤_env^𝒢 ∪ 𝓟(𝒢)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Controller {
     /// The possible choices with their probabilities, which sum to 1.
@@ -83,10 +84,6 @@ impl Controller {
             Some(actions) => Choice::Act(members.into_iter().zip(actions).collect()),
             None => delegate.clone(),
         };
-        debug_assert!(
-            table.shape().joint_action(DELEGATE).is_none(),
-            "column 0 delegates"
-        );
         Self {
             choices: log_p_c
                 .iter()
@@ -110,7 +107,7 @@ impl Controller {
             .collect()
     }
 
-    /// p(u | s), eq. (5): Σ_path p(u | s, path)·p(path | s), where p(u | s, path) is 1 if the path ends in u and else 0.
+    /// p(u | s), eq. (5): `Σ_path p(u | s, path)·p(path | s)`, where p(u | s, path) is 1 if the path ends in u and else 0.
     ///
     /// # Shapes
     /// `actions_n` \[N\].

@@ -25,7 +25,7 @@ pub fn partition_count(agents: usize) -> u128 {
 pub fn all_partitions(agents: usize) -> Vec<Partition> {
     let team: Vec<AgentId> = (0..agents).map(AgentId::new).collect();
     let mut partitions = Vec::new();
-    if agents % 2 == 0 {
+    if agents.is_multiple_of(2) {
         extend_matchings(&mut Vec::new(), &team, &[], &mut partitions);
     } else {
         for &left_out in &team {

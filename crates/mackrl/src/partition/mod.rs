@@ -1,6 +1,6 @@
 //! Partitions of a team into pairs with at most one singleton.
 //!
-//! The pair selector π_ps chooses one [`Partition`] a step. Which partitions it may choose from is a
+//! The pair selector chooses one [`Partition`] a step. Which partitions it may choose from is a
 //! [`PartitionSchedule`]: up to [`PartitionSchedule::MOST_AGENTS_ENUMERATED`] agents all of them, as in the paper. Ten
 //! agents have 945 and 27 have 2·10¹⁴, so larger teams use a seeded sample or a tournament's rounds, neither of which
 //! enumerates anything. Either way the set in force is known to every agent before the selector chooses, so the

@@ -45,7 +45,7 @@ pub fn sample_partitions(agents: usize, count: usize, seed: u64) -> Result<Vec<P
 pub(super) fn shuffle(order: &mut [AgentId], key: &EpisodeKey, step: usize) {
     for last in (1..order.len()).rev() {
         let bits = u128::from(key.bits(step, Draw::Setup(last)));
-        let chosen = bits * (last as u128 + 1) >> 64;
+        let chosen = (bits * (last as u128 + 1)) >> 64;
         order.swap(
             last,
             usize::try_from(chosen).expect("the chosen place is at most `last`"),

@@ -35,7 +35,7 @@ impl PolicyShape {
         1 + self.actions * self.actions
     }
 
-    /// The column of the joint action (`first`, `second`): 1 + u_a·A + u_b.
+    /// The column of the joint action (`first`, `second`): `1 + u_a·A + u_b`.
     #[must_use]
     pub const fn column(self, first: Action, second: Action) -> usize {
         1 + first.index() * self.actions + second.index()
@@ -122,20 +122,20 @@ impl<'a, F: Real> PolicyTable<'a, F> {
         self.partitions
     }
 
-    /// log π_ps \[P\].
+    /// `log π_ps` \[P\].
     #[must_use]
     pub const fn selector(&self) -> &'a [F] {
         self.log_p_selector_p
     }
 
-    /// log π_pc of the pair numbered `pair` \[1 + A·A\].
+    /// `log π_pc` of the pair numbered `pair` \[1 + A·A\].
     #[must_use]
     pub fn pair(&self, pair: usize) -> &'a [F] {
         let columns = self.shape.columns();
         &self.log_p_pair_kc[pair * columns..(pair + 1) * columns]
     }
 
-    /// log π_a of the agent numbered `agent` \[A\].
+    /// `log π_a` of the agent numbered `agent` \[A\].
     #[must_use]
     pub fn agent(&self, agent: usize) -> &'a [F] {
         let actions = self.shape.actions;
