@@ -1,1 +1,40 @@
-//! The numerical core: small layers with explicit backward passes.
+//! The numerical core: small recurrent networks with explicit backward passes, on one thread, without allocation.
+//!
+//! The controllers of the paper are tiny (64 units over 6 to 800 rows), so what a framework spends around its kernels costs
+//! more than the kernels. Here a network is a handful of ranges in one flat parameter vector ([`ParameterLayout`]); its
+//! activations live in a [`Trace`] that the caller owns, that acting fills one step at a time and that
+//! [`RecurrentNetwork::backward`] reads: acting and learning share one forward pass.
+//!
+//! No crate of matrix products would do, because of the contract of decentralised execution. An agent that evaluates one row
+//! must get the bits that the central run got for that row in a batch of eighty. So **every forward result of a row depends on
+//! that row and the parameters alone**, whatever the number of rows, the row's place among them and the width of the machine's
+//! vectors: an output is `acc = bias; for k ascending: acc = fma(x[k], w[k][j], acc)`, the exponential, hyperbolic tangent,
+//! sigmoid and logarithm are our own sequences of fused operations, the same on every width, and a sum over columns has a fixed
+//! number of partial sums. Sums over *rows* occur in gradients only.
+//!
+//! The code is written once over [`Real`](crate::Real): `f32` runs on SIMD instructions chosen at run time (AVX-512, AVX2,
+//! NEON, or none), `f64` runs the same kernels one number at a time, for the tests against finite differences.
+
+mod aligned;
+pub mod benchmark;
+mod elementary;
+mod feed_forward;
+mod gru;
+mod lanes;
+mod linear;
+mod optimiser;
+mod parameters;
+mod product;
+mod recurrent;
+mod softmax;
+mod trace;
+
+pub use feed_forward::{FeedForward, FeedForwardTrace, FeedForwardWeights};
+pub use gru::Gru;
+pub use lanes::Element;
+pub use linear::Linear;
+pub use optimiser::{Moments, Optimiser, OptimiserKind, clip_gradient_norm, first_not_finite};
+pub use parameters::{ParameterLayout, TensorSpec};
+pub use recurrent::{NetworkSizes, RecurrentNetwork, RecurrentWeights};
+pub use softmax::MaskedLogSoftmax;
+pub use trace::{Retention, Trace};

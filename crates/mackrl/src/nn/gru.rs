@@ -1,0 +1,415 @@
+//! A gated recurrent unit with PyTorch's semantics.
+//!
+//! The four pre-activations of a row lie side by side as [n, r, z, q]: then the input feeds the contiguous columns (n, r, z),
+//! the hidden state the contiguous columns (r, z, q), and each direction needs one product instead of three.
+
+use std::ops::Range;
+
+use mackrl_env::EpisodeKey;
+
+use crate::{
+    Real,
+    nn::{
+        aligned::Aligned,
+        lanes::{Element, Kernel, Lanes},
+        parameters::{ParameterLayout, fill_uniform},
+        product::{ColumnSums, Packed, Product, Rows, Start, WeightGradient},
+    },
+};
+
+/// Columns of gates per hidden unit: candidate n, reset r, update z, and q, the hidden state's part of the candidate.
+pub(crate) const GATES: usize = 4;
+
+/// A gated recurrent unit, as places in a flat parameter vector.
+///
+/// # Equation
+/// r = σ(W_ir x + b_ir + W_hr h + b_hr), z = σ(W_iz x + b_iz + W_hz h + b_hz), q = W_hn h + b_hn,
+/// n = tanh(W_in x + b_in + r q), h' = (1 − z) n + z h
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Gru {
+    /// Length of x.
+    pub inputs: usize,
+    /// Length of h.
+    pub hidden: usize,
+    weight_ih: Range<usize>,
+    weight_hh: Range<usize>,
+    bias_ih: Range<usize>,
+    bias_hh: Range<usize>,
+}
+
+/// A unit's weights as its kernels read them.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct GruWeights<R> {
+    /// [inputs, (n, r, z)]
+    input_forward: Packed<R>,
+    /// [hidden, (r, z)]
+    hidden_forward: Packed<R>,
+    /// [hidden, q]
+    candidate_forward: Packed<R>,
+    /// [(n, r, z), inputs]
+    input_backward: Packed<R>,
+    /// [(r, z, q), hidden]
+    hidden_backward: Packed<R>,
+    /// Both biases of (n, r, z) except b_hn.
+    bias: Vec<R>,
+    /// b_hn
+    candidate_bias: Vec<R>,
+}
+
+impl Gru {
+    /// Adds `{name}.weight_ih` [3 hidden, inputs], `{name}.weight_hh` [3 hidden, hidden], `{name}.bias_ih` and
+    /// `{name}.bias_hh` [3 hidden] to a layout; gates in PyTorch's order r, z, n.
+    pub fn new(layout: &mut ParameterLayout, name: &str, inputs: usize, hidden: usize) -> Self {
+        Self {
+            inputs,
+            hidden,
+            weight_ih: layout.add(format!("{name}.weight_ih"), &[3 * hidden, inputs]),
+            weight_hh: layout.add(format!("{name}.weight_hh"), &[3 * hidden, hidden]),
+            bias_ih: layout.add(format!("{name}.bias_ih"), &[3 * hidden]),
+            bias_hh: layout.add(format!("{name}.bias_hh"), &[3 * hidden]),
+        }
+    }
+
+    /// Draws all parameters uniformly from ±1/√hidden, as PyTorch does.
+    pub fn initialise<R: Real>(&self, key: &EpisodeKey, parameters: &mut [R]) {
+        let bound = 1.0 / (self.hidden as f64).sqrt();
+        for range in [
+            &self.weight_ih,
+            &self.weight_hh,
+            &self.bias_ih,
+            &self.bias_hh,
+        ] {
+            fill_uniform(key, range.clone(), bound, parameters);
+        }
+    }
+
+    /// Copies the parameters into the orders that the forward pass reads.
+    pub(crate) fn refresh_forward<E: Element>(&self, parameters: &[E], to: &mut GruWeights<E>) {
+        let h = self.hidden;
+        let [input_rz, input_n] = self.columns(&parameters[self.weight_ih.clone()]);
+        to.input_forward.resize(self.inputs, 3 * h);
+        to.input_forward.pack(input_n, 0, h);
+        to.input_forward.pack(input_rz, h, 2 * h);
+        let [hidden_rz, hidden_n] = self.columns(&parameters[self.weight_hh.clone()]);
+        to.hidden_forward.resize(h, 2 * h);
+        to.hidden_forward.pack(hidden_rz, 0, 2 * h);
+        to.candidate_forward.resize(h, h);
+        to.candidate_forward.pack(hidden_n, 0, h);
+
+        let (bias_ih, bias_hh) = (
+            &parameters[self.bias_ih.clone()],
+            &parameters[self.bias_hh.clone()],
+        );
+        to.bias.clear();
+        to.bias.extend_from_slice(&bias_ih[2 * h..]);
+        to.bias.extend(
+            bias_ih[..2 * h]
+                .iter()
+                .zip(bias_hh)
+                .map(|(&input, &hidden)| input + hidden),
+        );
+        to.candidate_bias.clear();
+        to.candidate_bias.extend_from_slice(&bias_hh[2 * h..]);
+    }
+
+    /// Copies the parameters into the orders that the backward pass reads.
+    pub(crate) fn refresh_backward<E: Element>(&self, parameters: &[E], to: &mut GruWeights<E>) {
+        let h = self.hidden;
+        let [input_rz, input_n] = self.columns(&parameters[self.weight_ih.clone()]);
+        to.input_backward.resize(3 * h, self.inputs);
+        to.input_backward.pack_transposed(input_n, 0, h);
+        to.input_backward.pack_transposed(input_rz, h, 2 * h);
+        let [hidden_rz, hidden_n] = self.columns(&parameters[self.weight_hh.clone()]);
+        to.hidden_backward.resize(3 * h, h);
+        to.hidden_backward.pack_transposed(hidden_rz, 0, 2 * h);
+        to.hidden_backward.pack_transposed(hidden_n, 2 * h, h);
+    }
+
+    /// The columns (r, z) and n of a weight [_, (r, z, n)].
+    fn columns<'a, R>(&self, weight: &'a [R]) -> [Rows<'a, R>; 2] {
+        let stride = 3 * self.hidden;
+        [
+            Rows {
+                values: weight,
+                stride,
+            },
+            Rows {
+                values: &weight[2 * self.hidden..],
+                stride,
+            },
+        ]
+    }
+
+    /// One step; the gates [n, r, z, q] are kept for the backward pass.
+    ///
+    /// # Shapes
+    /// `x` [rows, inputs], `previous` and `next` [rows, hidden], `gates` [rows, 4 hidden].
+    pub(crate) fn forward<E: Element>(
+        &self,
+        weights: &GruWeights<E>,
+        rows: usize,
+        x: &[E],
+        previous: &[E],
+        gates: &mut [E],
+        next: &mut [E],
+    ) {
+        let h = self.hidden;
+        let c_stride = GATES * h;
+        Product {
+            rows,
+            a: Rows {
+                values: x,
+                stride: self.inputs,
+            },
+            b: &weights.input_forward,
+            start: Start::Bias(&weights.bias),
+            c: gates,
+            c_stride,
+        }
+        .compute();
+        let a = Rows {
+            values: previous,
+            stride: h,
+        };
+        Product {
+            rows,
+            a,
+            b: &weights.hidden_forward,
+            start: Start::Kept,
+            c: &mut gates[h..],
+            c_stride,
+        }
+        .compute();
+        Product {
+            rows,
+            a,
+            b: &weights.candidate_forward,
+            start: Start::Bias(&weights.candidate_bias),
+            c: &mut gates[3 * h..],
+            c_stride,
+        }
+        .compute();
+        E::dispatch(Activate {
+            hidden: h,
+            rows,
+            previous,
+            gates,
+            next,
+        });
+    }
+
+    /// Replaces the gates by the gradients of their pre-activations, and `gradient`, that of h', by that of h.
+    ///
+    /// # Shapes
+    /// `previous` and `gradient` [rows, hidden], `gates` [rows, 4 hidden].
+    pub(crate) fn hidden_gradient<E: Element>(
+        &self,
+        weights: &GruWeights<E>,
+        rows: usize,
+        previous: &[E],
+        gates: &mut [E],
+        gradient: &mut [E],
+    ) {
+        let h = self.hidden;
+        E::dispatch(Differentiate {
+            hidden: h,
+            rows,
+            previous,
+            gates: &mut *gates,
+            gradient: &mut *gradient,
+        });
+        Product {
+            rows,
+            a: Rows {
+                values: &gates[h..],
+                stride: GATES * h,
+            },
+            b: &weights.hidden_backward,
+            start: Start::Kept,
+            c: gradient,
+            c_stride: h,
+        }
+        .compute();
+    }
+
+    /// Gives the gradient of x from the gradients of the gates.
+    pub(crate) fn input_gradient<E: Element>(
+        &self,
+        weights: &GruWeights<E>,
+        rows: usize,
+        gates: &[E],
+        dx: &mut [E],
+    ) {
+        Product {
+            rows,
+            a: Rows {
+                values: gates,
+                stride: GATES * self.hidden,
+            },
+            b: &weights.input_backward,
+            start: Start::Zero,
+            c: dx,
+            c_stride: self.inputs,
+        }
+        .compute();
+    }
+
+    /// Adds the parameters' gradients to the flat `gradient`, from the gradients of the gates.
+    pub(crate) fn parameter_gradient<E: Element>(
+        &self,
+        rows: usize,
+        x: &[E],
+        previous: &[E],
+        gates: &[E],
+        gradient: &mut [E],
+        scratch: &mut Aligned<E>,
+    ) {
+        let h = self.hidden;
+        let x = Rows {
+            values: x,
+            stride: self.inputs,
+        };
+        let previous = Rows {
+            values: previous,
+            stride: h,
+        };
+        let [n, rz, rzq] = [0, h, h].map(|from| Rows {
+            values: &gates[from..],
+            stride: GATES * h,
+        });
+        for (place, to, a, d, columns) in [
+            (&self.weight_ih, 0, x, rz, 2 * h),
+            (&self.weight_ih, 2 * h, x, n, h),
+            (&self.weight_hh, 0, previous, rzq, 3 * h),
+        ] {
+            WeightGradient {
+                rows,
+                inner: a.stride,
+                columns,
+                a,
+                d,
+                gradient: &mut gradient[place.clone()][to..],
+                gradient_stride: 3 * h,
+                scratch: &mut *scratch,
+            }
+            .compute();
+        }
+        let bias_ih = &mut gradient[self.bias_ih.clone()];
+        ColumnSums {
+            rows,
+            d: rz,
+            sums: &mut bias_ih[..2 * h],
+        }
+        .compute();
+        ColumnSums {
+            rows,
+            d: n,
+            sums: &mut bias_ih[2 * h..],
+        }
+        .compute();
+        ColumnSums {
+            rows,
+            d: rzq,
+            sums: &mut gradient[self.bias_hh.clone()],
+        }
+        .compute();
+    }
+}
+
+/// Turns pre-activations into gates and gives the next hidden state.
+struct Activate<'a, R> {
+    hidden: usize,
+    rows: usize,
+    previous: &'a [R],
+    gates: &'a mut [R],
+    next: &'a mut [R],
+}
+
+impl<E: Element> Kernel<E> for Activate<'_, E> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes<Element = E>>(self, lanes: L) {
+        let h = self.hidden;
+        let states = self
+            .previous
+            .chunks_exact(h)
+            .zip(self.next.chunks_exact_mut(h));
+        for ((previous, next), gates) in states
+            .zip(self.gates.chunks_exact_mut(GATES * h))
+            .take(self.rows)
+        {
+            let [n_row, r_row, z_row, q_row] = gate_rows(gates, h);
+            let one = lanes.splat(E::ONE);
+            for at in (0..h).step_by(L::LANES) {
+                let to = (at + L::LANES).min(h);
+                let r = lanes.sigmoid(lanes.load(&r_row[at..to]));
+                let z = lanes.sigmoid(lanes.load(&z_row[at..to]));
+                let q = lanes.load(&q_row[at..to]);
+                let n = lanes.tanh(lanes.mul_add(r, q, lanes.load(&n_row[at..to])));
+                let kept = lanes.mul(z, lanes.load(&previous[at..to]));
+                let state = lanes.mul_add(lanes.sub(one, z), n, kept);
+                lanes.store(&mut n_row[at..to], n);
+                lanes.store(&mut r_row[at..to], r);
+                lanes.store(&mut z_row[at..to], z);
+                lanes.store(&mut next[at..to], state);
+            }
+        }
+    }
+}
+
+/// Turns gates into the gradients of their pre-activations, and the gradient of h' into its direct part z · dh' in h.
+struct Differentiate<'a, R> {
+    hidden: usize,
+    rows: usize,
+    previous: &'a [R],
+    gates: &'a mut [R],
+    gradient: &'a mut [R],
+}
+
+impl<E: Element> Kernel<E> for Differentiate<'_, E> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes<Element = E>>(self, lanes: L) {
+        let h = self.hidden;
+        let states = self
+            .previous
+            .chunks_exact(h)
+            .zip(self.gradient.chunks_exact_mut(h));
+        for ((previous, gradient), gates) in states
+            .zip(self.gates.chunks_exact_mut(GATES * h))
+            .take(self.rows)
+        {
+            let [n_row, r_row, z_row, q_row] = gate_rows(gates, h);
+            let one = lanes.splat(E::ONE);
+            for at in (0..h).step_by(L::LANES) {
+                let to = (at + L::LANES).min(h);
+                let (n, r) = (lanes.load(&n_row[at..to]), lanes.load(&r_row[at..to]));
+                let (z, q) = (lanes.load(&z_row[at..to]), lanes.load(&q_row[at..to]));
+                let (previous, dh) = (lanes.load(&previous[at..to]), lanes.load(&gradient[at..to]));
+                let not_z = lanes.sub(one, z);
+                let slope = lanes.sub(one, lanes.mul(n, n));
+                let dn = lanes.mul(lanes.mul(dh, not_z), slope);
+                let dq = lanes.mul(dn, r);
+                let dr = lanes.mul(lanes.mul(dq, q), lanes.sub(one, r));
+                let direct = lanes.mul(dh, z);
+                let dz = lanes.mul(lanes.mul(direct, not_z), lanes.sub(previous, n));
+                lanes.store(&mut n_row[at..to], dn);
+                lanes.store(&mut r_row[at..to], dr);
+                lanes.store(&mut z_row[at..to], dz);
+                lanes.store(&mut q_row[at..to], dq);
+                lanes.store(&mut gradient[at..to], direct);
+            }
+        }
+    }
+}
+
+/// The four parts of a row of gates.
+#[inline(always)]
+fn gate_rows<R>(gates: &mut [R], hidden: usize) -> [&mut [R]; GATES] {
+    let (n, rest) = gates.split_at_mut(hidden);
+    let (r, rest) = rest.split_at_mut(hidden);
+    let (z, q) = rest.split_at_mut(hidden);
+    [n, r, z, q]
+}

@@ -1,0 +1,282 @@
+//! Lanes: one kernel source for every width of vector, and for `f64`.
+//!
+//! A [`Kernel`] is written over [`Lanes`], a handful of lane-wise operations. [`Element::dispatch`] runs it with the widest
+//! instructions that the machine has (through the `pulp` crate, which keeps the code free of `unsafe`), and for `f64` one
+//! number at a time. No operation here combines lanes, so a result never depends on how many there are.
+
+use pulp::Simd;
+
+use crate::{Real, nn::elementary};
+
+/// The number of columns to which reductions and packed matrices are padded; every width divides it.
+pub(crate) const BLOCK: usize = 16;
+
+/// Lane-wise arithmetic of one width.
+pub trait Lanes: Copy {
+    /// The kind of number in a lane.
+    type Element: Element;
+    /// A vector of numbers.
+    type Vector: Copy;
+    /// How many numbers a vector has; divides 16.
+    const LANES: usize;
+
+    /// Views a slice as whole vectors, dropping a rest.
+    fn vectors(slice: &[Self::Element]) -> &[Self::Vector];
+    /// Views a slice as whole vectors, dropping a rest.
+    fn vectors_mut(slice: &mut [Self::Element]) -> &mut [Self::Vector];
+    /// All lanes the same.
+    fn splat(self, value: Self::Element) -> Self::Vector;
+    /// a + b
+    fn add(self, a: Self::Vector, b: Self::Vector) -> Self::Vector;
+    /// a − b
+    fn sub(self, a: Self::Vector, b: Self::Vector) -> Self::Vector;
+    /// a · b
+    fn mul(self, a: Self::Vector, b: Self::Vector) -> Self::Vector;
+    /// a · b + c with one rounding.
+    fn mul_add(self, a: Self::Vector, b: Self::Vector, c: Self::Vector) -> Self::Vector;
+    /// `value` where `condition` > 0, else 0.
+    fn where_positive(self, condition: Self::Vector, value: Self::Vector) -> Self::Vector;
+    /// `value` where `condition` > −∞, else −∞.
+    fn where_possible(self, condition: Self::Vector, value: Self::Vector) -> Self::Vector;
+    /// eˣ
+    fn exp(self, x: Self::Vector) -> Self::Vector;
+    /// ln x
+    fn ln(self, x: Self::Vector) -> Self::Vector;
+    /// tanh x
+    fn tanh(self, x: Self::Vector) -> Self::Vector;
+    /// 1 / (1 + e⁻ˣ)
+    fn sigmoid(self, x: Self::Vector) -> Self::Vector;
+
+    /// The first numbers of a slice, and zeros where it is shorter than a vector.
+    #[inline(always)]
+    fn load(self, slice: &[Self::Element]) -> Self::Vector {
+        if let Some(vector) = Self::vectors(slice).first() {
+            return *vector;
+        }
+        let mut padded = [Self::Element::ZERO; BLOCK];
+        padded[..slice.len()].copy_from_slice(slice);
+        Self::vectors(&padded)[0]
+    }
+
+    /// Overwrites the first numbers of a slice, as many as it has.
+    #[inline(always)]
+    fn store(self, slice: &mut [Self::Element], vector: Self::Vector) {
+        if let Some(place) = Self::vectors_mut(slice).first_mut() {
+            *place = vector;
+            return;
+        }
+        let mut padded = [Self::Element::ZERO; BLOCK];
+        Self::vectors_mut(&mut padded)[0] = vector;
+        let length = slice.len();
+        slice.copy_from_slice(&padded[..length]);
+    }
+}
+
+/// A computation that is written once for every width.
+pub trait Kernel<E> {
+    /// What it gives.
+    type Output;
+    /// Runs it with the given lanes.
+    fn run<L: Lanes<Element = E>>(self, lanes: L) -> Self::Output;
+}
+
+/// A number that networks can be computed in: `f32`, or `f64` for tests.
+pub trait Element: Real {
+    /// Runs a kernel with the best instructions of this machine.
+    fn dispatch<K: Kernel<Self>>(kernel: K) -> K::Output;
+}
+
+impl Element for f32 {
+    #[inline]
+    fn dispatch<K: Kernel<Self>>(kernel: K) -> K::Output {
+        #[cfg(test)]
+        if let Some(width) = forced::width() {
+            return forced::dispatch(width, kernel);
+        }
+        pulp::Arch::new().dispatch(Vectorised(kernel))
+    }
+}
+
+impl Element for f64 {
+    #[inline]
+    fn dispatch<K: Kernel<Self>>(kernel: K) -> K::Output {
+        kernel.run(OneByOne)
+    }
+}
+
+/// Lets `pulp` run a kernel.
+struct Vectorised<K>(K);
+
+impl<K: Kernel<f32>> pulp::WithSimd for Vectorised<K> {
+    type Output = K::Output;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> K::Output {
+        self.0.run(Vectors(simd))
+    }
+}
+
+/// Vectors of `f32`.
+#[derive(Clone, Copy)]
+struct Vectors<S>(S);
+
+impl<S: Simd> Lanes for Vectors<S> {
+    type Element = f32;
+    type Vector = S::f32s;
+    const LANES: usize = S::F32_LANES;
+
+    #[inline(always)]
+    fn vectors(slice: &[f32]) -> &[S::f32s] {
+        S::as_simd_f32s(slice).0
+    }
+    #[inline(always)]
+    fn vectors_mut(slice: &mut [f32]) -> &mut [S::f32s] {
+        S::as_mut_simd_f32s(slice).0
+    }
+    #[inline(always)]
+    fn splat(self, value: f32) -> S::f32s {
+        self.0.splat_f32s(value)
+    }
+    #[inline(always)]
+    fn add(self, a: S::f32s, b: S::f32s) -> S::f32s {
+        self.0.add_f32s(a, b)
+    }
+    #[inline(always)]
+    fn sub(self, a: S::f32s, b: S::f32s) -> S::f32s {
+        self.0.sub_f32s(a, b)
+    }
+    #[inline(always)]
+    fn mul(self, a: S::f32s, b: S::f32s) -> S::f32s {
+        self.0.mul_f32s(a, b)
+    }
+    #[inline(always)]
+    fn mul_add(self, a: S::f32s, b: S::f32s, c: S::f32s) -> S::f32s {
+        self.0.mul_add_f32s(a, b, c)
+    }
+    #[inline(always)]
+    fn where_positive(self, condition: S::f32s, value: S::f32s) -> S::f32s {
+        let zero = self.0.splat_f32s(0.0);
+        let mask = self.0.less_than_or_equal_f32s(condition, zero);
+        self.0.select_f32s(mask, zero, value)
+    }
+    #[inline(always)]
+    fn where_possible(self, condition: S::f32s, value: S::f32s) -> S::f32s {
+        let impossible = self.0.splat_f32s(f32::NEG_INFINITY);
+        let mask = self.0.equal_f32s(condition, impossible);
+        self.0.select_f32s(mask, impossible, value)
+    }
+    #[inline(always)]
+    fn exp(self, x: S::f32s) -> S::f32s {
+        elementary::exp(self.0, x)
+    }
+    #[inline(always)]
+    fn ln(self, x: S::f32s) -> S::f32s {
+        elementary::ln(self.0, x)
+    }
+    #[inline(always)]
+    fn tanh(self, x: S::f32s) -> S::f32s {
+        elementary::tanh(self.0, x)
+    }
+    #[inline(always)]
+    fn sigmoid(self, x: S::f32s) -> S::f32s {
+        elementary::sigmoid(self.0, x)
+    }
+}
+
+/// "Vectors" of one `f64`.
+#[derive(Clone, Copy)]
+struct OneByOne;
+
+impl Lanes for OneByOne {
+    type Element = f64;
+    type Vector = f64;
+    const LANES: usize = 1;
+
+    fn vectors(slice: &[f64]) -> &[f64] {
+        slice
+    }
+    fn vectors_mut(slice: &mut [f64]) -> &mut [f64] {
+        slice
+    }
+    fn splat(self, value: f64) -> f64 {
+        value
+    }
+    fn add(self, a: f64, b: f64) -> f64 {
+        a + b
+    }
+    fn sub(self, a: f64, b: f64) -> f64 {
+        a - b
+    }
+    fn mul(self, a: f64, b: f64) -> f64 {
+        a * b
+    }
+    fn mul_add(self, a: f64, b: f64, c: f64) -> f64 {
+        a.mul_add(b, c)
+    }
+    fn where_positive(self, condition: f64, value: f64) -> f64 {
+        if condition <= 0.0 { 0.0 } else { value }
+    }
+    fn where_possible(self, condition: f64, value: f64) -> f64 {
+        if condition == f64::NEG_INFINITY {
+            f64::NEG_INFINITY
+        } else {
+            value
+        }
+    }
+    fn exp(self, x: f64) -> f64 {
+        x.exp()
+    }
+    fn ln(self, x: f64) -> f64 {
+        x.ln()
+    }
+    fn tanh(self, x: f64) -> f64 {
+        x.tanh()
+    }
+    fn sigmoid(self, x: f64) -> f64 {
+        1.0 / (1.0 + (-x).exp())
+    }
+}
+
+/// Lets tests choose the width, to show that it changes no bit.
+#[cfg(test)]
+pub(crate) mod forced {
+    use std::cell::Cell;
+
+    use super::{Kernel, Vectorised};
+
+    /// A width of vector.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub(crate) enum Width {
+        /// One number at a time.
+        Scalar,
+        /// AVX2, where the machine has it; else one number at a time.
+        Avx2,
+    }
+
+    thread_local! {
+        static WIDTH: Cell<Option<Width>> = const { Cell::new(None) };
+    }
+
+    pub(crate) fn width() -> Option<Width> {
+        WIDTH.get()
+    }
+
+    /// Computes something with every kernel on this thread forced to `width`.
+    pub(crate) fn with_width<T>(width: Width, compute: impl FnOnce() -> T) -> T {
+        WIDTH.set(Some(width));
+        let result = compute();
+        WIDTH.set(None);
+        result
+    }
+
+    pub(super) fn dispatch<K: Kernel<f32>>(width: Width, kernel: K) -> K::Output {
+        #[cfg(target_arch = "x86_64")]
+        if width == Width::Avx2
+            && let Some(simd) = pulp::x86::V3::try_new()
+        {
+            return pulp::Simd::vectorize(simd, Vectorised(kernel));
+        }
+        let _ = width;
+        pulp::Arch::Scalar.dispatch(Vectorised(kernel))
+    }
+}

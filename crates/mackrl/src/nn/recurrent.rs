@@ -1,0 +1,292 @@
+//! The recurrent network of every controller: Linear + ReLU, a gated recurrent unit, Linear.
+
+use std::ops::Range;
+
+use mackrl_env::EpisodeKey;
+
+use crate::{
+    Real,
+    nn::{
+        gru::{GATES, Gru, GruWeights},
+        lanes::{Element, Kernel, Lanes},
+        linear::{Linear, LinearWeights},
+        parameters::ParameterLayout,
+        trace::{Step, Trace, Workspace},
+    },
+};
+
+/// Rows of a block of the backward pass, at least: the gradients of the weights are taken over as many whole steps together.
+/// More rows mean fewer passes over the gradient, fewer rows mean that activations are still in the second cache.
+const BLOCK_ROWS: usize = 128;
+
+/// The sizes of a [`RecurrentNetwork`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct NetworkSizes {
+    /// Length of a row of inputs.
+    pub inputs: usize,
+    /// Units of the first layer and of the recurrent unit.
+    pub hidden: usize,
+    /// Length of a row of logits.
+    pub outputs: usize,
+}
+
+/// Linear + ReLU, a gated recurrent unit, Linear; as places in a flat parameter vector.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RecurrentNetwork {
+    input: Linear,
+    gru: Gru,
+    output: Linear,
+}
+
+/// The weights of a [`RecurrentNetwork`] as its kernels read them: copied from the flat vector once per update.
+#[derive(Debug, Clone)]
+pub struct RecurrentWeights<R> {
+    input: LinearWeights<R>,
+    gru: GruWeights<R>,
+    output: LinearWeights<R>,
+}
+
+impl RecurrentNetwork {
+    /// Adds the tensors of `{name}.input`, `{name}.gru` and `{name}.output` to a layout.
+    pub fn new(layout: &mut ParameterLayout, name: &str, sizes: NetworkSizes) -> Self {
+        let NetworkSizes {
+            inputs,
+            hidden,
+            outputs,
+        } = sizes;
+        Self {
+            input: Linear::new(layout, &format!("{name}.input"), inputs, hidden),
+            gru: Gru::new(layout, &format!("{name}.gru"), hidden, hidden),
+            output: Linear::new(layout, &format!("{name}.output"), hidden, outputs),
+        }
+    }
+
+    /// The sizes it was made with.
+    #[must_use]
+    pub const fn sizes(&self) -> NetworkSizes {
+        NetworkSizes {
+            inputs: self.input.inputs,
+            hidden: self.gru.hidden,
+            outputs: self.output.outputs,
+        }
+    }
+
+    /// Draws initial parameters as PyTorch does. The draw of a parameter is named by `key` and its index in the flat vector,
+    /// so models with vectors of their own need different keys.
+    pub fn initialise<R: Real>(&self, key: &EpisodeKey, parameters: &mut [R]) {
+        self.input.initialise(key, parameters);
+        self.gru.initialise(key, parameters);
+        self.output.initialise(key, parameters);
+    }
+
+    /// Prepares the weights for [`step`](Self::step) and [`backward`](Self::backward).
+    #[must_use]
+    pub fn weights<E: Element>(&self, parameters: &[E]) -> RecurrentWeights<E> {
+        let mut weights = RecurrentWeights {
+            input: LinearWeights::default(),
+            gru: GruWeights::default(),
+            output: LinearWeights::default(),
+        };
+        self.refresh(parameters, &mut weights);
+        weights
+    }
+
+    /// Brings prepared weights up to date after an update, without allocating.
+    pub fn refresh<E: Element>(&self, parameters: &[E], weights: &mut RecurrentWeights<E>) {
+        self.input.refresh_forward(parameters, &mut weights.input);
+        self.gru.refresh_forward(parameters, &mut weights.gru);
+        self.gru.refresh_backward(parameters, &mut weights.gru);
+        self.output.refresh_forward(parameters, &mut weights.output);
+        self.output
+            .refresh_backward(parameters, &mut weights.output);
+    }
+
+    /// Computes the current step of a trace from its inputs.
+    ///
+    /// # Panics
+    /// If no step was begun, or if the trace is for other sizes.
+    pub fn step<E: Element>(&self, weights: &RecurrentWeights<E>, trace: &mut Trace<E>) {
+        assert_eq!(trace.sizes, self.sizes(), "sizes of the trace");
+        let NetworkSizes {
+            inputs,
+            hidden,
+            outputs,
+        } = trace.sizes;
+        let range = trace.last_rows();
+        let (first, rows) = (range.start, range.len());
+        let x = &trace.inputs.as_slice()[first * inputs..];
+        let features = &mut trace.features.as_mut_slice()[first * hidden..][..rows * hidden];
+        self.input.forward(&weights.input, rows, x, features);
+        E::dispatch(Rectify { values: features });
+        let next = &mut trace.hidden.as_mut_slice()[first * hidden..];
+        self.gru.forward(
+            &weights.gru,
+            rows,
+            features,
+            &trace.previous.as_slice()[first * hidden..],
+            &mut trace.gates.as_mut_slice()[first * GATES * hidden..],
+            next,
+        );
+        let logits = &mut trace.logits.as_mut_slice()[first * outputs..];
+        self.output.forward(&weights.output, rows, next, logits);
+    }
+
+    /// Back-propagates the gradients of the logits through all steps and adds the parameters' gradients to the flat
+    /// `gradient`.
+    ///
+    /// The trace's activations are used up: a trace can be differentiated once.
+    ///
+    /// # Panics
+    /// If the trace is for other sizes or does not hold the whole episode.
+    pub fn backward<E: Element>(
+        &self,
+        weights: &RecurrentWeights<E>,
+        trace: &mut Trace<E>,
+        gradient: &mut [E],
+    ) {
+        assert_eq!(trace.sizes, self.sizes(), "sizes of the trace");
+        assert_eq!(
+            trace.steps.len(),
+            trace.steps(),
+            "a trace that holds the whole episode"
+        );
+        let last = trace.steps.last().map_or(0, |step| step.rows.len());
+        let hidden_gradient = &mut trace.workspace.hidden_gradient;
+        hidden_gradient.grow(last * trace.sizes.hidden);
+        hidden_gradient.as_mut_slice()[..last * trace.sizes.hidden].fill(E::ZERO);
+        let mut end = trace.steps.len();
+        while end > 0 {
+            let block = block_before(&trace.steps, end);
+            let rows = trace.steps[block.start].rows.start..trace.steps[end - 1].rows.end;
+            trace
+                .workspace
+                .features_gradient
+                .grow(rows.len() * trace.sizes.hidden);
+            for t in block.clone().rev() {
+                self.step_backward(weights, trace, t, rows.start);
+                trace.carry_gradient_back(t);
+            }
+            self.parameter_gradient(trace, rows, gradient);
+            end = block.start;
+        }
+    }
+
+    /// Turns the gates of step `t` into their gradients, and the gradient of its hidden state into that of the state before.
+    fn step_backward<E: Element>(
+        &self,
+        weights: &RecurrentWeights<E>,
+        trace: &mut Trace<E>,
+        t: usize,
+        block_start: usize,
+    ) {
+        let NetworkSizes {
+            hidden, outputs, ..
+        } = trace.sizes;
+        let first = trace.steps[t].rows.start;
+        let rows = trace.steps[t].rows.len();
+        let Workspace {
+            features_gradient,
+            hidden_gradient,
+            ..
+        } = &mut trace.workspace;
+        let hidden_gradient = hidden_gradient.as_mut_slice();
+        let logits_gradient = &trace.logits_gradient.as_slice()[first * outputs..];
+        self.output
+            .input_gradient(&weights.output, rows, logits_gradient, hidden_gradient);
+
+        let gates = &mut trace.gates.as_mut_slice()[first * GATES * hidden..];
+        let previous = &trace.previous.as_slice()[first * hidden..];
+        self.gru
+            .hidden_gradient(&weights.gru, rows, previous, gates, hidden_gradient);
+
+        let place = (first - block_start) * hidden;
+        let features_gradient = &mut features_gradient.as_mut_slice()[place..][..rows * hidden];
+        self.gru
+            .input_gradient(&weights.gru, rows, gates, features_gradient);
+        let features = &trace.features.as_slice()[first * hidden..][..rows * hidden];
+        E::dispatch(RectifyGradient {
+            values: features,
+            gradient: features_gradient,
+        });
+    }
+
+    /// Adds the gradients of all parameters over some rows of a trace whose gates already are gradients.
+    fn parameter_gradient<E: Element>(
+        &self,
+        trace: &mut Trace<E>,
+        rows: Range<usize>,
+        gradient: &mut [E],
+    ) {
+        let NetworkSizes {
+            inputs,
+            hidden,
+            outputs,
+        } = trace.sizes;
+        let (first, count) = (rows.start, rows.len());
+        let Workspace {
+            features_gradient,
+            scratch,
+            ..
+        } = &mut trace.workspace;
+        let logits_gradient = &trace.logits_gradient.as_slice()[first * outputs..];
+        let state = &trace.hidden.as_slice()[first * hidden..];
+        self.output
+            .parameter_gradient(count, state, logits_gradient, gradient, scratch);
+
+        let features = &trace.features.as_slice()[first * hidden..];
+        let previous = &trace.previous.as_slice()[first * hidden..];
+        let gates = &trace.gates.as_slice()[first * GATES * hidden..];
+        self.gru
+            .parameter_gradient(count, features, previous, gates, gradient, scratch);
+
+        let x = &trace.inputs.as_slice()[first * inputs..];
+        self.input
+            .parameter_gradient(count, x, features_gradient.as_slice(), gradient, scratch);
+    }
+}
+
+/// The last steps before step `end` that together have [`BLOCK_ROWS`] rows, or all.
+fn block_before(steps: &[Step], end: usize) -> Range<usize> {
+    let last_row = steps[end - 1].rows.end;
+    let mut start = end - 1;
+    while start > 0 && last_row - steps[start].rows.start < BLOCK_ROWS {
+        start -= 1;
+    }
+    start..end
+}
+
+/// max(x, 0)
+pub(crate) struct Rectify<'a, R> {
+    pub(crate) values: &'a mut [R],
+}
+
+impl<E: Element> Kernel<E> for Rectify<'_, E> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes<Element = E>>(self, lanes: L) {
+        for part in self.values.chunks_mut(L::LANES) {
+            let value = lanes.load(part);
+            lanes.store(part, lanes.where_positive(value, value));
+        }
+    }
+}
+
+/// Keeps the gradient where max(x, 0) is positive.
+pub(crate) struct RectifyGradient<'a, R> {
+    pub(crate) values: &'a [R],
+    pub(crate) gradient: &'a mut [R],
+}
+
+impl<E: Element> Kernel<E> for RectifyGradient<'_, E> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes<Element = E>>(self, lanes: L) {
+        let values = self.values.chunks(L::LANES);
+        for (gradient, value) in self.gradient.chunks_mut(L::LANES).zip(values) {
+            let kept = lanes.where_positive(lanes.load(value), lanes.load(gradient));
+            lanes.store(gradient, kept);
+        }
+    }
+}

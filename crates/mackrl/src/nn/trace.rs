@@ -1,0 +1,271 @@
+//! The activations of a recurrent network over an episode.
+//!
+//! The caller owns a trace and uses it from update to update; it is filled while acting and read by the backward pass, so
+//! there is no second forward pass, and after the longest episode nothing is allocated any more. All steps lie one after the
+//! other, however many rows each has: products over whole steps or many steps see one matrix.
+
+use std::ops::Range;
+
+use crate::{
+    Real,
+    nn::{aligned::Aligned, gru::GATES, recurrent::NetworkSizes},
+};
+
+/// How much of an episode a [`Trace`] keeps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Retention {
+    /// Every step, for the backward pass.
+    Episode,
+    /// The last step only, for acting without learning.
+    LastStep,
+}
+
+/// One step of a trace.
+#[derive(Debug, Clone)]
+pub(crate) struct Step {
+    /// Its rows among those of all steps.
+    pub(crate) rows: Range<usize>,
+    /// Whether row i continues row i of the previous step, for every i.
+    pub(crate) unchanged: bool,
+}
+
+/// The activations of a recurrent network, step after step.
+#[derive(Debug, Clone)]
+pub struct Trace<R> {
+    pub(crate) sizes: NetworkSizes,
+    retention: Retention,
+    steps_begun: usize,
+    pub(crate) steps: Vec<Step>,
+    /// For every row, the row of the previous step that it continues.
+    pub(crate) carry: Vec<usize>,
+    /// [rows, inputs]
+    pub(crate) inputs: Aligned<R>,
+    /// [rows, hidden], the rectified output of the first layer.
+    pub(crate) features: Aligned<R>,
+    /// [rows, hidden], the hidden state that each row continues.
+    pub(crate) previous: Aligned<R>,
+    /// [rows, 4 hidden]
+    pub(crate) gates: Aligned<R>,
+    /// [rows, hidden]
+    pub(crate) hidden: Aligned<R>,
+    /// [rows, outputs]
+    pub(crate) logits: Aligned<R>,
+    /// [rows, outputs]
+    pub(crate) logits_gradient: Aligned<R>,
+    pub(crate) workspace: Workspace<R>,
+}
+
+/// Buffers of the backward pass.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Workspace<R> {
+    /// [rows of a block, hidden]
+    pub(crate) features_gradient: Aligned<R>,
+    /// [rows of a step, hidden]
+    pub(crate) hidden_gradient: Aligned<R>,
+    /// [rows of a step, hidden]
+    pub(crate) carried_gradient: Aligned<R>,
+    pub(crate) scratch: Aligned<R>,
+}
+
+impl<R: Real> Trace<R> {
+    /// An empty trace for networks of these sizes.
+    #[must_use]
+    pub fn new(sizes: NetworkSizes, retention: Retention) -> Self {
+        Self {
+            sizes,
+            retention,
+            steps_begun: 0,
+            steps: Vec::new(),
+            carry: Vec::new(),
+            inputs: Aligned::default(),
+            features: Aligned::default(),
+            previous: Aligned::default(),
+            gates: Aligned::default(),
+            hidden: Aligned::default(),
+            logits: Aligned::default(),
+            logits_gradient: Aligned::default(),
+            workspace: Workspace::default(),
+        }
+    }
+
+    /// Forgets all steps; the next one starts from a hidden state of zero.
+    pub fn begin_episode(&mut self) {
+        self.steps_begun = 0;
+        self.steps.clear();
+        self.carry.clear();
+    }
+
+    /// Begins a step of `rows` rows whose inputs are all zero.
+    ///
+    /// Row i continues row `carry[i]` of the previous step, or row i where `carry` is `None`. The first step of an episode
+    /// has nothing to continue and ignores `carry`.
+    ///
+    /// # Panics
+    /// If `carry` does not have one entry a row, or an entry (or, without `carry`, a row) that the previous step lacks.
+    pub fn begin_step(&mut self, rows: usize, carry: Option<&[usize]>) {
+        let previous = self.steps.last().map(|step| step.rows.clone());
+        let start = match (self.retention, &previous) {
+            (Retention::Episode, Some(previous)) => previous.end,
+            _ => 0,
+        };
+        if self.retention == Retention::LastStep {
+            self.steps.clear();
+            self.carry.clear();
+        }
+        self.grow(start + rows);
+        let h = self.sizes.hidden;
+        let states = &mut self.previous.as_mut_slice()[start * h..(start + rows) * h];
+        if let Some(previous) = &previous {
+            let last = &self.hidden.as_slice()[previous.start * h..previous.end * h];
+            match carry {
+                Some(carry) => {
+                    assert_eq!(carry.len(), rows, "one row to continue for each row");
+                    for (state, &row) in states.chunks_exact_mut(h).zip(carry) {
+                        state.copy_from_slice(&last[row * h..][..h]);
+                    }
+                    self.carry.extend_from_slice(carry);
+                }
+                None => {
+                    states.copy_from_slice(&last[..rows * h]);
+                    self.carry.extend(0..rows);
+                }
+            }
+        } else {
+            states.fill(R::ZERO);
+            self.carry.extend(0..rows);
+        }
+        let inputs = self.sizes.inputs;
+        self.inputs.as_mut_slice()[start * inputs..][..rows * inputs].fill(R::ZERO);
+        let unchanged = carry.is_none() && previous.is_none_or(|previous| previous.len() == rows);
+        self.steps.push(Step {
+            rows: start..start + rows,
+            unchanged,
+        });
+        self.steps_begun += 1;
+    }
+
+    /// The inputs of the current step [rows, inputs], to be filled; all zero when the step begins.
+    ///
+    /// # Panics
+    /// If no step was begun.
+    pub fn input_mut(&mut self) -> &mut [R] {
+        let rows = self.last_rows();
+        let inputs = self.sizes.inputs;
+        &mut self.inputs.as_mut_slice()[rows.start * inputs..rows.end * inputs]
+    }
+
+    /// How many steps the episode has so far.
+    #[must_use]
+    pub const fn steps(&self) -> usize {
+        self.steps_begun
+    }
+
+    /// How many rows step `t` has.
+    ///
+    /// # Panics
+    /// If the trace does not hold step `t`.
+    #[must_use]
+    pub fn rows(&self, t: usize) -> usize {
+        self.rows_of(t).len()
+    }
+
+    /// The inputs of step `t` [rows, inputs].
+    ///
+    /// # Panics
+    /// If the trace does not hold step `t`.
+    #[must_use]
+    pub fn inputs(&self, t: usize) -> &[R] {
+        rows_of(&self.inputs, self.rows_of(t), self.sizes.inputs)
+    }
+
+    /// The hidden state after step `t` [rows, hidden].
+    ///
+    /// # Panics
+    /// If the trace does not hold step `t`.
+    #[must_use]
+    pub fn hidden(&self, t: usize) -> &[R] {
+        rows_of(&self.hidden, self.rows_of(t), self.sizes.hidden)
+    }
+
+    /// The logits of step `t` [rows, outputs].
+    ///
+    /// # Panics
+    /// If the trace does not hold step `t`.
+    #[must_use]
+    pub fn logits(&self, t: usize) -> &[R] {
+        rows_of(&self.logits, self.rows_of(t), self.sizes.outputs)
+    }
+
+    /// The logits of the current step [rows, outputs].
+    ///
+    /// # Panics
+    /// If no step was begun.
+    #[must_use]
+    pub fn last_logits(&self) -> &[R] {
+        rows_of(&self.logits, self.last_rows(), self.sizes.outputs)
+    }
+
+    /// The place for the gradient of the logits of step `t` [rows, outputs], to be filled before the backward pass. It holds
+    /// numbers of earlier episodes: write every element.
+    ///
+    /// # Panics
+    /// If the trace does not hold step `t`.
+    pub fn logits_gradient_mut(&mut self, t: usize) -> &mut [R] {
+        let rows = self.rows_of(t);
+        let outputs = self.sizes.outputs;
+        self.logits_gradient.grow(self.last_rows().end * outputs);
+        &mut self.logits_gradient.as_mut_slice()[rows.start * outputs..rows.end * outputs]
+    }
+
+    /// The rows of the current step among all that are kept.
+    pub(crate) fn last_rows(&self) -> Range<usize> {
+        self.steps.last().expect("a step was begun").rows.clone()
+    }
+
+    /// Gives each row of the step before `t` the sum of the hidden state's gradients of the rows that continue it.
+    pub(crate) fn carry_gradient_back(&mut self, t: usize) {
+        if t == 0 || self.steps[t].unchanged {
+            return;
+        }
+        let h = self.sizes.hidden;
+        let before = self.steps[t - 1].rows.len();
+        let Workspace {
+            hidden_gradient,
+            carried_gradient,
+            ..
+        } = &mut self.workspace;
+        carried_gradient.grow(before * h);
+        let carried = &mut carried_gradient.as_mut_slice()[..before * h];
+        carried.fill(R::ZERO);
+        let gradients = hidden_gradient.as_slice().chunks_exact(h);
+        for (&row, gradient) in self.carry[self.steps[t].rows.clone()].iter().zip(gradients) {
+            for (sum, &term) in carried[row * h..][..h].iter_mut().zip(gradient) {
+                *sum += term;
+            }
+        }
+        std::mem::swap(hidden_gradient, carried_gradient);
+    }
+
+    fn rows_of(&self, t: usize) -> Range<usize> {
+        let forgotten = self.steps_begun - self.steps.len();
+        self.steps[t - forgotten].rows.clone()
+    }
+
+    fn grow(&mut self, rows: usize) {
+        let NetworkSizes {
+            inputs,
+            hidden,
+            outputs,
+        } = self.sizes;
+        self.inputs.grow(rows * inputs);
+        self.features.grow(rows * hidden);
+        self.previous.grow(rows * hidden);
+        self.gates.grow(rows * GATES * hidden);
+        self.hidden.grow(rows * hidden);
+        self.logits.grow(rows * outputs);
+    }
+}
+
+fn rows_of<R: Real>(buffer: &Aligned<R>, rows: Range<usize>, columns: usize) -> &[R] {
+    &buffer.as_slice()[rows.start * columns..rows.end * columns]
+}
