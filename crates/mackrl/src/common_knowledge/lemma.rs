@@ -10,6 +10,19 @@ use mackrl_env::{AgentId, EntitySet, KnownEntities, PriorKnowledge};
 /// # Shapes
 /// `visible_n` \[N\]: the entities that each agent sees, itself included while it lives.
 ///
+/// # Examples
+/// Figure 1: A and B see each other, C sees both and is seen by neither.
+/// ```
+/// use mackrl::common_knowledge::common_knowledge;
+/// use mackrl_env::{AgentId, EntitySet};
+///
+/// let [a, b, c] = [0, 1, 2].map(AgentId::new);
+/// let visible_n = [0b011, 0b011, 0b111].map(EntitySet::from_bits);
+/// assert_eq!(common_knowledge(&[a, b], &visible_n).bits(), 0b011);
+/// assert!(common_knowledge(&[a, c], &visible_n).is_empty());
+/// assert!(common_knowledge(&[a, b, c], &visible_n).is_empty());
+/// ```
+///
 /// # Equation
 /// Eq. (3): 𝓘^𝒢 = ∩_{a ∈ 𝒢} 𝓜^a if μ^a(s^a, s^b) for all a, b ∈ 𝒢, else ∅.
 #[must_use]

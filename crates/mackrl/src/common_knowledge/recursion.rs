@@ -2,7 +2,7 @@
 //!
 //! Far slower than Lemma 1 and without any cleverness, so that the lemma can be tested against it. The paper proves that
 //! the tower is complete from level 3 on; [`Limit::stable_from`] shows that it is complete at level 2 at the latest, and at
-//! level 1 if all members see each other.
+//! level 1 where there is any common knowledge.
 
 use mackrl_env::{AgentId, EntitySet};
 

@@ -55,6 +55,9 @@ impl Sampler {
     ///
     /// # Shapes
     /// `log_p_p` \[P\].
+    ///
+    /// # Panics
+    /// If no entry of the row is available.
     #[must_use]
     pub fn choose_partition<F: Real>(&self, log_p_p: &[F]) -> usize {
         self.choose(log_p_p, Draw::Selector)
@@ -64,6 +67,9 @@ impl Sampler {
     ///
     /// # Shapes
     /// `log_p_c` \[1 + A·A\].
+    ///
+    /// # Panics
+    /// If no entry of the row is available.
     #[must_use]
     pub fn choose_pair<F: Real>(
         &self,
@@ -84,6 +90,9 @@ impl Sampler {
     ///
     /// # Shapes
     /// `log_p_a` \[A\].
+    ///
+    /// # Panics
+    /// If no entry of the row is available.
     #[must_use]
     pub fn choose_action<F: Real>(&self, agent: AgentId, log_p_a: &[F]) -> Action {
         Action::new(self.choose(log_p_a, Draw::Agent(agent.index())))

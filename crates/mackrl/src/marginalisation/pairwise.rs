@@ -32,12 +32,12 @@ pub struct MarginalGradient<F> {
 /// One pair's factor of p(u | partition): the joint way plus the delegated way.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct PairFactor<F> {
-    /// `log( π_pc(u_a, u_b) + π_pc(d)·π_a(u_a)·π_b(u_b) )`
+    /// `log π_pc(u_a, u_b)`
+    joint: F,
+    /// `log π_pc(d) + log π_a(u_a) + log π_b(u_b)`
+    delegated: F,
+    /// The logarithm of the sum of both probabilities.
     log_p: F,
-    /// Share of the first term, in [0, 1].
-    joint_share: F,
-    /// Share of the second term.
-    delegate_share: F,
 }
 
 impl<F: Real> MarginalGradient<F> {
@@ -174,8 +174,8 @@ fn distribute<F: Real>(table: &PolicyTable<'_, F>, gradient: &mut MarginalGradie
                 continue;
             };
             let posterior = gradient.joint_k[k];
-            gradient.joint_k[k] = posterior * factor.joint_share;
-            gradient.delegate_k[k] = posterior * factor.delegate_share;
+            gradient.joint_k[k] = posterior * share(factor.joint, factor.log_p);
+            gradient.delegate_k[k] = posterior * share(factor.delegated, factor.log_p);
             for agent in pair.agents() {
                 gradient.agent_n[agent.index()] += gradient.delegate_k[k];
             }
@@ -207,29 +207,77 @@ fn pair_factor<F: Real>(
     let delegated = log_p_c[DELEGATE]
         + table.agent(a)[actions_n[a].index()]
         + table.agent(b)[actions_n[b].index()];
-    let log_p = log_sum_exp([joint, delegated]);
     PairFactor {
-        log_p,
-        joint_share: share(joint, log_p),
-        delegate_share: share(delegated, log_p),
+        joint,
+        delegated,
+        log_p: log_sum_exp([joint, delegated]),
     }
 }
 
 /// e^{term − total}: the share of a term in a sum, both in logarithms; 0 if the sum is empty of probability.
 fn share<F: Real>(term: F, total: F) -> F {
-    if term > F::NEG_INFINITY {
-        (term - total).exp()
-    } else {
+    if term == F::NEG_INFINITY {
         F::ZERO
+    } else {
+        (term - total).exp()
     }
 }
 
-/// log Σ e^{x}, −∞ if there is no probability. A sum with one term that is not −∞ is that term, to the bit.
-fn log_sum_exp<F: Real>(terms: impl IntoIterator<Item = F, IntoIter: Clone>) -> F {
-    let terms = terms.into_iter();
-    let largest = terms.clone().fold(F::NEG_INFINITY, F::max);
-    if largest == F::NEG_INFINITY {
-        return largest;
+/// log Σ e^{x} in one pass, −∞ if there is no probability. If one term alone is not −∞, it is returned to the bit; a NaN
+/// stays one, so that whoever checks the result finds it.
+fn log_sum_exp<F: Real>(terms: impl IntoIterator<Item = F>) -> F {
+    let mut largest = F::NEG_INFINITY;
+    // Σ e^{x − largest} over the terms so far.
+    let mut sum = F::ZERO;
+    for term in terms {
+        if term > largest {
+            sum = sum * (largest - term).exp() + F::ONE;
+            largest = term;
+        } else if term != F::NEG_INFINITY {
+            sum += (term - largest).exp();
+        }
     }
-    largest + terms.map(|term| (term - largest).exp()).sum::<F>().ln()
+    largest + sum.ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NONE: f64 = f64::NEG_INFINITY;
+
+    #[test]
+    fn a_sum_without_probability_is_minus_infinity_and_has_no_shares() {
+        assert_eq!(log_sum_exp::<f64>([]), NONE);
+        assert_eq!(log_sum_exp([NONE, NONE]), NONE);
+        assert_eq!(share(NONE, NONE), 0.0);
+        assert_eq!(share(NONE, -3.0), 0.0);
+    }
+
+    #[test]
+    fn a_sum_of_one_term_is_that_term_to_the_bit() {
+        let term = -0.123_456_789_f64;
+        for terms in [[term, NONE], [NONE, term]] {
+            assert_eq!(log_sum_exp(terms).to_bits(), term.to_bits());
+        }
+    }
+
+    #[test]
+    fn sums_do_not_depend_on_where_the_largest_term_stands() {
+        let expected = -1_000.0 + (1.0 + 2.0 * (-1.0_f64).exp()).ln();
+        for terms in [
+            [-1_000.0, -1_001.0, -1_001.0],
+            [-1_001.0, -1_000.0, -1_001.0],
+            [-1_001.0, -1_001.0, -1_000.0],
+        ] {
+            assert!((log_sum_exp(terms) - expected).abs() < 1e-12, "{terms:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_a_number_is_not_hidden() {
+        for terms in [[f64::NAN, 0.0], [0.0, f64::NAN], [NONE, f64::NAN]] {
+            assert!(log_sum_exp(terms).is_nan(), "{terms:?}");
+        }
+    }
 }
