@@ -8,7 +8,9 @@ pub mod error;
 mod face;
 pub mod rules;
 pub mod scenario;
+pub mod scripted;
 mod settings;
+mod speed;
 pub mod terrain;
 pub mod unit_types;
 
@@ -16,4 +18,5 @@ pub use error::SkirmishError;
 pub use face::{Skirmish, SkirmishKnowledge};
 pub use scenario::Scenario;
 pub use settings::{Compatibility, SkirmishSettings};
+pub use speed::{Speed, measure_speed};
 pub use unit_types::UnitData;

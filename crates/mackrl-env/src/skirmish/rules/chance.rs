@@ -22,7 +22,6 @@ impl Chance {
     }
 
     /// A number uniform in \[0, 1).
-    #[expect(clippy::cast_possible_truncation, reason = "24 bits are exact in f32")]
     pub fn uniform(&mut self) -> f32 {
         let draw = Draw::World(self.draws);
         self.draws += 1;

@@ -32,10 +32,10 @@ impl Battle {
         if unit.swing.is_some() {
             return;
         }
-        if let Some(quarry) = unit.quarry {
-            if unit.rescan > 0.0 || self.is_in_reach(index, usize::from(quarry)) {
-                return;
-            }
+        if let Some(quarry) = unit.quarry
+            && (unit.rescan > 0.0 || self.is_in_reach(index, usize::from(quarry)))
+        {
+            return;
         }
         let found = self.nearest_target(index, false);
         let hunts = self.state.units[index].order == Order::Hunt;
