@@ -1,1 +1,22 @@
 //! StarCraft micromanagement: the rules of battle and their reinforcement-learning face.
+//!
+//! The rules ([`rules`]) know units, orders, weapons and walls; the face ([`Skirmish`]) shows them to agents as SMAC does
+//! (Samvelyan and others, "The StarCraft Multi-Agent Challenge", 2019) and adds the local views of [`crate::Environment`].
+//! Unit statistics and maps are data ([`unit_types`], [`scenario`]), read from the files under `units/` and `maps/`.
+
+pub mod error;
+mod face;
+pub mod rules;
+pub mod scenario;
+pub mod scripted;
+mod settings;
+mod speed;
+pub mod terrain;
+pub mod unit_types;
+
+pub use error::SkirmishError;
+pub use face::{Skirmish, SkirmishKnowledge};
+pub use scenario::Scenario;
+pub use settings::{Compatibility, SkirmishSettings};
+pub use speed::{Speed, measure_speed};
+pub use unit_types::UnitData;

@@ -1,0 +1,167 @@
+//! Sizes of an observation and of its parts, derived from a scenario and the settings.
+
+use crate::{
+    EnvironmentSpec,
+    skirmish::{
+        rules::Team,
+        scenario::{Race, Scenario},
+        settings::{Compatibility, SkirmishSettings},
+    },
+};
+
+/// Actions before the first target: no-op, stop, north, south, east, west.
+pub(super) const TARGET_ACTIONS_FROM: usize = 6;
+
+/// Sizes and positions of all that agents and critics are shown.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Layout {
+    pub(super) agents: usize,
+    pub(super) enemies: usize,
+    pub(super) actions: usize,
+    /// 1 if allies are observed with shields, else 0.
+    pub(super) ally_shields: usize,
+    /// 1 if enemies are observed with shields, else 0.
+    pub(super) enemy_shields: usize,
+    /// Length of SMAC's one-hot of types: 0 if the allies are all of one type.
+    pub(super) type_bits: usize,
+    /// Per kind: its place in the one-hot of an ally, if allies have such units.
+    pub(super) ally_type: Vec<Option<usize>>,
+    /// Per kind: its place in the one-hot of an enemy.
+    pub(super) enemy_type: Vec<Option<usize>>,
+    /// Whether agents see the last actions of allies.
+    pub(super) obs_last_action: bool,
+    /// Whether the state ends with last actions.
+    pub(super) state_last_action: bool,
+    /// Whether entity features have a shield.
+    pub(super) entity_shields: bool,
+    /// Length of the one-hot of an entity's kind: 0 if there is one kind only.
+    pub(super) entity_kinds: usize,
+}
+
+impl Layout {
+    pub(super) fn new(scenario: &Scenario, settings: &SkirmishSettings) -> Self {
+        let kinds = scenario.field.profiles.len();
+        let mut ally_kinds: Vec<usize> = scenario
+            .recruits
+            .iter()
+            .filter(|recruit| recruit.team == Team::Ally)
+            .map(|recruit| usize::from(recruit.kind))
+            .collect();
+        ally_kinds.sort_unstable();
+        ally_kinds.dedup();
+        let type_bits = if ally_kinds.len() > 1 {
+            ally_kinds.len()
+        } else {
+            0
+        };
+        let place = |order: &[usize], kind: usize| {
+            order
+                .iter()
+                .position(|other| *other == kind)
+                .filter(|_| type_bits > 0)
+        };
+        let enemy_order = enemy_type_order(scenario, settings.compat, &ally_kinds);
+        Self {
+            agents: scenario.agents,
+            enemies: scenario.enemies(),
+            actions: TARGET_ACTIONS_FROM + scenario.enemies(),
+            ally_shields: usize::from(scenario.races[0] == Race::Protoss),
+            enemy_shields: usize::from(scenario.races[1] == Race::Protoss),
+            type_bits,
+            ally_type: (0..kinds).map(|kind| place(&ally_kinds, kind)).collect(),
+            enemy_type: (0..kinds).map(|kind| place(&enemy_order, kind)).collect(),
+            obs_last_action: settings.obs_last_action,
+            state_last_action: settings.state_last_action,
+            entity_shields: scenario
+                .field
+                .profiles
+                .iter()
+                .any(|profile| profile.shield > 0.0),
+            entity_kinds: if kinds > 1 { kinds } else { 0 },
+        }
+    }
+
+    /// \[attackable, distance, x, y, life, (shield), (type)\].
+    pub(super) fn enemy_row(&self) -> usize {
+        5 + self.enemy_shields + self.type_bits
+    }
+
+    /// \[visible, distance, x, y, life, (shield), (type), (last action)\].
+    pub(super) fn ally_row(&self) -> usize {
+        let last_action = if self.obs_last_action {
+            self.actions
+        } else {
+            0
+        };
+        5 + self.ally_shields + self.type_bits + last_action
+    }
+
+    /// \[life, (shield), (type)\].
+    pub(super) fn own_row(&self) -> usize {
+        1 + self.ally_shields + self.type_bits
+    }
+
+    pub(super) fn observation_size(&self) -> usize {
+        let moves = 4;
+        moves
+            + self.enemies * self.enemy_row()
+            + (self.agents - 1) * self.ally_row()
+            + self.own_row()
+    }
+
+    /// \[life, cooldown, x, y, (shield), (type)\].
+    pub(super) fn state_ally_row(&self) -> usize {
+        4 + self.ally_shields + self.type_bits
+    }
+
+    /// \[life, x, y, (shield), (type)\].
+    pub(super) fn state_enemy_row(&self) -> usize {
+        3 + self.enemy_shields + self.type_bits
+    }
+
+    pub(super) fn state_size(&self) -> usize {
+        let last_actions = if self.state_last_action {
+            self.agents * self.actions
+        } else {
+            0
+        };
+        self.agents * self.state_ally_row() + self.enemies * self.state_enemy_row() + last_actions
+    }
+
+    /// F: \[x, y, life, (shield), (kind)\].
+    pub(super) fn entity_features(&self) -> usize {
+        3 + usize::from(self.entity_shields) + self.entity_kinds
+    }
+
+    pub(super) fn spec(&self, scenario: &Scenario, settings: &SkirmishSettings) -> EnvironmentSpec {
+        EnvironmentSpec {
+            name: scenario.name.clone(),
+            agents: self.agents,
+            entities: self.agents + self.enemies,
+            entity_features: self.entity_features(),
+            actions: self.actions,
+            observation_size: self.observation_size(),
+            state_size: self.state_size(),
+            episode_limit: scenario.episode_limit,
+            distance_scale: settings.sight_range,
+        }
+    }
+}
+
+/// Kinds in the order of the one-hot of enemies. SMAC numbers allies by their own type ids, which are alphabetical, and
+/// enemies by the game's, which differ on maps of stalkers (74) and zealots (73): there an enemy zealot comes first.
+fn enemy_type_order(
+    scenario: &Scenario,
+    compat: Compatibility,
+    ally_kinds: &[usize],
+) -> Vec<usize> {
+    let mut order = ally_kinds.to_vec();
+    let names: Vec<&str> = order
+        .iter()
+        .map(|kind| scenario.field.profiles[*kind].name.as_str())
+        .collect();
+    if compat == Compatibility::Smac && names == ["stalker", "zealot"] {
+        order.sort_by_key(|kind| scenario.type_ids[*kind]);
+    }
+    order
+}

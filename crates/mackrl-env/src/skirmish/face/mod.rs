@@ -1,0 +1,11 @@
+//! What agents see of a battle, what they can do in it and what it pays: SMAC's interface and the local views of ours.
+
+mod environment;
+mod knowledge;
+mod layout;
+mod observation;
+mod reward;
+mod state_vector;
+
+pub use environment::Skirmish;
+pub use knowledge::SkirmishKnowledge;

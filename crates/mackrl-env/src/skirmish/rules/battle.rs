@@ -1,0 +1,127 @@
+//! A battle and its clock.
+
+use std::sync::Arc;
+
+use crate::skirmish::rules::{
+    BattleState, Battlefield, Chance, Order, Stance, Team, Unit, UnitIndex,
+    combat::Hit,
+    movement::{Footing, Neighbours},
+};
+
+/// A battle: what changes, on what does not.
+#[derive(Debug, Clone)]
+pub struct Battle {
+    pub(super) field: Arc<Battlefield>,
+    pub(super) state: BattleState,
+    pub(super) scratch: Scratch,
+}
+
+/// Buffers that live for one loop, kept so that a loop allocates nothing.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Scratch {
+    /// Where each unit wants to walk in this loop, if anywhere.
+    pub(super) destination: Vec<Option<[f32; 2]>>,
+    /// How each unit stands in this loop.
+    pub(super) footing: Vec<Footing>,
+    /// Hits that land at the end of this loop.
+    pub(super) hits: Vec<Hit>,
+    /// Units that can be in each other's way.
+    pub(super) neighbours: Neighbours,
+}
+
+impl Battle {
+    /// An empty battle with room for `capacity` units.
+    #[must_use]
+    pub fn new(field: Arc<Battlefield>, capacity: usize) -> Self {
+        let mut battle = Self {
+            field,
+            state: BattleState::default(),
+            scratch: Scratch::default(),
+        };
+        battle.reserve(capacity);
+        battle
+    }
+
+    /// What changes.
+    #[must_use]
+    pub fn state(&self) -> &BattleState {
+        &self.state
+    }
+
+    /// What never changes.
+    #[must_use]
+    pub fn field(&self) -> &Battlefield {
+        &self.field
+    }
+
+    /// Goes back (or forth) to `state`, which a battle on the same battlefield was in.
+    pub fn restore(&mut self, state: &BattleState) {
+        self.state.clone_from(state);
+        self.reserve(self.state.units.len());
+    }
+
+    /// Puts a fresh unit of the given kind on the field; returns its index.
+    ///
+    /// # Panics
+    /// If `kind` is not among the battlefield's profiles, or there are 256 units already.
+    pub fn add(&mut self, kind: u8, team: Team, stance: Stance, [x, y]: [f32; 2]) -> UnitIndex {
+        let profile = &self.field.profiles[usize::from(kind)];
+        let index = UnitIndex::try_from(self.state.units.len()).expect("a battle has ≤ 256 units");
+        self.state.x.push(x);
+        self.state.y.push(y);
+        self.state.units.push(Unit {
+            kind,
+            team,
+            stance,
+            life: profile.life,
+            shield: profile.shield,
+            order: Order::Stop,
+            quarry: None,
+            chase_from: [x, y],
+            rescan: 0.0,
+            cooldown: 0.0,
+            swing: None,
+            backswing: 0.0,
+            unharmed: self.field.shield_delay_loops,
+            call_wait: 0.0,
+            detour: 0,
+            detour_loops: 0,
+        });
+        self.reserve(self.state.units.len());
+        index
+    }
+
+    /// Gives a living unit an order. An order that it already has changes nothing; another one ends an attack that has not
+    /// reached its damage point.
+    pub fn order(&mut self, unit: UnitIndex, order: Order) {
+        let unit = &mut self.state.units[usize::from(unit)];
+        if unit.is_alive() && unit.order != order {
+            unit.order = order;
+            unit.quarry = None;
+            unit.swing = None;
+            unit.backswing = 0.0;
+            unit.detour_loops = 0;
+        }
+    }
+
+    /// Plays one loop.
+    pub fn advance(&mut self, chance: &mut Chance) {
+        self.choose_quarries();
+        self.act(chance);
+        self.walk();
+        self.fly_missiles();
+        self.count_down_blows();
+        self.land_hits();
+        self.regenerate();
+    }
+
+    fn reserve(&mut self, units: usize) {
+        // One missile is in the air for most of a period at worst, so that four per unit are never reached.
+        self.state.missiles.reserve(4 * units);
+        self.state.blows.reserve(4 * units);
+        self.scratch.hits.reserve(4 * units);
+        self.scratch.destination.resize(units, None);
+        self.scratch.footing.resize(units, Footing::Standing);
+        self.scratch.neighbours.reserve(units);
+    }
+}

@@ -1,0 +1,285 @@
+//! The weapon cycle and what hits do.
+//!
+//! An attack starts when the weapon is ready and the target in range (edge to edge). It takes effect at the damage point, if
+//! the target is still within range plus slop, and is lost otherwise. The period runs from start to start and is spent at the
+//! damage point, so an attack that is broken off before costs nothing. After the effect a unit that nobody orders elsewhere
+//! stands for the backswing.
+
+use crate::skirmish::rules::{
+    Battle, Blow, Chance, Missile, Order, Profile, Stance, Strike, UnitIndex, movement::Footing,
+};
+
+/// A hit that lands at the end of the loop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Hit {
+    pub(super) target: UnitIndex,
+    pub(super) attacker: UnitIndex,
+}
+
+impl Battle {
+    /// Lets every living unit act on its order or its quarry: stand, attack, or choose where to walk.
+    pub(super) fn act(&mut self, chance: &mut Chance) {
+        for index in 0..self.state.units.len() {
+            self.scratch.destination[index] = None;
+            self.scratch.footing[index] = Footing::Standing;
+            if !self.state.units[index].is_alive() {
+                continue;
+            }
+            self.tick(index);
+            match self.target_of(index) {
+                Some(target) => self.fight(index, usize::from(target), chance),
+                None => self.follow_order(index),
+            }
+        }
+    }
+
+    /// Counts a unit's clocks by one loop.
+    fn tick(&mut self, index: usize) {
+        let unit = &mut self.state.units[index];
+        // The fraction by which a weapon is ready before the loop's beginning is worth something in this loop only.
+        unit.cooldown = if unit.cooldown > 0.0 {
+            unit.cooldown - 1.0
+        } else {
+            0.0
+        };
+        unit.backswing = (unit.backswing - 1.0).max(0.0);
+        unit.call_wait = (unit.call_wait - 1.0).max(0.0);
+    }
+
+    /// Whom a unit fights in this loop: the target of its order, or its quarry.
+    fn target_of(&mut self, index: usize) -> Option<UnitIndex> {
+        let unit = &self.state.units[index];
+        let Order::Attack { target } = unit.order else {
+            return unit.quarry;
+        };
+        let can_attack = self.can_attack(index, usize::from(target));
+        if !can_attack {
+            let unit = &mut self.state.units[index];
+            unit.order = Order::Stop;
+            unit.swing = None;
+        }
+        can_attack.then_some(target)
+    }
+
+    /// Whether `target` lives and the weapon of `index`, if it has one, reaches such units.
+    pub(super) fn can_attack(&self, index: usize, target: usize) -> bool {
+        let (unit, other) = (&self.state.units[index], &self.state.units[target]);
+        let strike = &self.field.profiles[usize::from(unit.kind)].strike;
+        other.is_alive()
+            && strike
+                .as_ref()
+                .is_some_and(|strike| strike.effects[usize::from(other.kind)].can_hit)
+    }
+
+    fn follow_order(&mut self, index: usize) {
+        let unit = &mut self.state.units[index];
+        unit.swing = None;
+        let waits = unit.stance == Stance::Aggressive && unit.backswing > 0.0;
+        if let Order::Move { to } | Order::AttackMove { to } = unit.order
+            && !waits
+        {
+            let (x, y) = (self.state.x[index], self.state.y[index]);
+            if [x, y] != to {
+                self.set_out(index, to);
+            } else if matches!(unit.order, Order::Move { .. }) {
+                unit.order = Order::Stop;
+            }
+        }
+    }
+
+    fn set_out(&mut self, index: usize, to: [f32; 2]) {
+        self.scratch.destination[index] = Some(to);
+        self.scratch.footing[index] = Footing::Walking;
+    }
+
+    /// One loop of fighting `target`: continue or start an attack, wait for the weapon, or walk closer.
+    fn fight(&mut self, index: usize, target: usize, chance: &mut Chance) {
+        let field = self.field.clone();
+        let Some((own, other, strike)) = self.pairing(&field, index, target) else {
+            return;
+        };
+        let square = self.state.distance_squared(index, target);
+        let unit = &mut self.state.units[index];
+        if let Some(swing) = unit.swing {
+            if square <= strike.slack_reach_squared(own, other) {
+                self.scratch.footing[index] = Footing::Braced;
+                self.swing(index, target, swing + 1.0, strike, chance);
+                return;
+            }
+            unit.swing = None;
+        }
+        if square <= strike.reach_squared(own, other) {
+            self.scratch.footing[index] = Footing::Braced;
+            if unit.cooldown <= 0.0 {
+                let head_start = -unit.cooldown;
+                self.swing(index, target, head_start, strike, chance);
+            }
+        } else if unit.backswing > 0.0 {
+            self.scratch.footing[index] = Footing::Braced;
+        } else if !own.is_immobile() {
+            let to = [self.state.x[target], self.state.y[target]];
+            self.set_out(index, to);
+        }
+    }
+
+    fn pairing<'a>(
+        &self,
+        field: &'a crate::skirmish::rules::Battlefield,
+        index: usize,
+        target: usize,
+    ) -> Option<(&'a Profile, &'a Profile, &'a Strike)> {
+        let own = &field.profiles[usize::from(self.state.units[index].kind)];
+        let other = &field.profiles[usize::from(self.state.units[target].kind)];
+        own.strike.as_ref().map(|strike| (own, other, strike))
+    }
+
+    /// Advances an attack to `elapsed` loops since its start; at the damage point it takes effect and spends the period.
+    fn swing(
+        &mut self,
+        index: usize,
+        target: usize,
+        elapsed: f32,
+        strike: &Strike,
+        chance: &mut Chance,
+    ) {
+        let [least, greatest] = self.field.jitter_loops;
+        let unit = &mut self.state.units[index];
+        if elapsed < strike.damage_point {
+            unit.swing = Some(elapsed);
+            return;
+        }
+        unit.swing = None;
+        unit.cooldown = strike.period + chance.between(least, greatest) - elapsed;
+        unit.backswing = strike.backswing;
+        self.take_effect(index, target, strike);
+    }
+
+    fn take_effect(&mut self, index: usize, target: usize, strike: &Strike) {
+        let (attacker, victim) = (small(index), small(target));
+        if strike.missile_speed.is_some() {
+            self.state.missiles.push(Missile {
+                x: self.state.x[index],
+                y: self.state.y[index],
+                target: victim,
+                shooter: attacker,
+            });
+            return;
+        }
+        self.scratch.hits.push(Hit {
+            target: victim,
+            attacker,
+        });
+        for hit in 1..strike.hits {
+            self.state.blows.push(Blow {
+                delay: f32::from(hit) * strike.hit_interval,
+                target: victim,
+                striker: attacker,
+            });
+        }
+    }
+
+    /// Moves missiles towards their targets; those that reach the edge of a living target hit it, those whose target is dead
+    /// are gone.
+    pub(super) fn fly_missiles(&mut self) {
+        let (field, state) = (&self.field, &mut self.state);
+        let hits = &mut self.scratch.hits;
+        let (units, xs, ys) = (&state.units, &state.x, &state.y);
+        state.missiles.retain_mut(|missile| {
+            let target = usize::from(missile.target);
+            if !units[target].is_alive() {
+                return false;
+            }
+            let kind = usize::from(units[usize::from(missile.shooter)].kind);
+            let speed = field.profiles[kind]
+                .strike
+                .as_ref()
+                .and_then(|strike| strike.missile_speed);
+            let speed = speed.expect("only units with missiles shoot them");
+            let radius = field.profiles[usize::from(units[target].kind)].radius;
+            let (dx, dy) = (xs[target] - missile.x, ys[target] - missile.y);
+            let distance = (dx * dx + dy * dy).sqrt();
+            if distance - radius <= speed {
+                hits.push(Hit {
+                    target: missile.target,
+                    attacker: missile.shooter,
+                });
+                return false;
+            }
+            missile.x += dx / distance * speed;
+            missile.y += dy / distance * speed;
+            true
+        });
+    }
+
+    /// Lands the later hits of attacks whose striker and target live.
+    pub(super) fn count_down_blows(&mut self) {
+        let (units, hits) = (&self.state.units, &mut self.scratch.hits);
+        self.state.blows.retain_mut(|blow| {
+            let striker = &units[usize::from(blow.striker)];
+            if !striker.is_alive() || !units[usize::from(blow.target)].is_alive() {
+                return false;
+            }
+            // A blow is entered in the loop of the first hit, and this loop counts it once already.
+            if blow.delay > 0.0 {
+                blow.delay -= 1.0;
+                return true;
+            }
+            hits.push(Hit {
+                target: blow.target,
+                attacker: blow.striker,
+            });
+            false
+        });
+    }
+
+    /// Applies all hits of the loop at once: nobody is spared a hit because its attacker died in the same loop.
+    pub(super) fn land_hits(&mut self) {
+        for index in 0..self.scratch.hits.len() {
+            let hit = self.scratch.hits[index];
+            let (attacker, target) = (usize::from(hit.attacker), usize::from(hit.target));
+            let attacker_kind = usize::from(self.state.units[attacker].kind);
+            let unit = &mut self.state.units[target];
+            let Some(strike) = &self.field.profiles[attacker_kind].strike else {
+                continue;
+            };
+            let effect = strike.effects[usize::from(unit.kind)];
+            (unit.shield, unit.life) = struck(unit.shield, unit.life, effect);
+            unit.unharmed = 0.0;
+        }
+        for index in 0..self.scratch.hits.len() {
+            let hit = self.scratch.hits[index];
+            self.respond(usize::from(hit.target), usize::from(hit.attacker));
+        }
+        self.scratch.hits.clear();
+    }
+
+    /// Recharges shields that were left alone long enough, and lets life grow back.
+    pub(super) fn regenerate(&mut self) {
+        let field = &self.field;
+        for unit in self.state.units.iter_mut().filter(|unit| unit.life > 0.0) {
+            let profile = &field.profiles[usize::from(unit.kind)];
+            if unit.unharmed >= field.shield_delay_loops && unit.shield < profile.shield {
+                unit.shield = (unit.shield + field.shield_per_loop).min(profile.shield);
+            }
+            unit.unharmed = (unit.unharmed + 1.0).min(field.shield_delay_loops);
+            if profile.life_per_loop > 0.0 {
+                unit.life = (unit.life + profile.life_per_loop).min(profile.life);
+            }
+        }
+    }
+}
+
+/// What a hit leaves of shield and life: the shield absorbs first, without armour; what is left of the hit meets the armour,
+/// and a hit does its least damage in any case.
+fn struck(shield: f32, life: f32, effect: super::profile::Effect) -> (f32, f32) {
+    if effect.damage <= shield {
+        return (shield - effect.damage, life);
+    }
+    let rest = effect.damage - shield;
+    let damage = (rest - effect.armour).max(effect.minimum);
+    (0.0, (life - damage).max(0.0))
+}
+
+fn small(index: usize) -> UnitIndex {
+    UnitIndex::try_from(index).expect("a battle has ≤ 256 units")
+}

@@ -1,0 +1,59 @@
+//! Where the units of a group appear.
+
+use crate::skirmish::{rules::Profile, terrain::Terrain};
+
+/// Edge of the lattice on which places are tried, in map units.
+const LATTICE: f32 = 0.25;
+/// Lattice steps from the point to the farthest place tried.
+const REACH: i32 = 64;
+
+/// Finds places for units of the given profiles around a point: each takes the free place nearest to the point, so the first
+/// stands on it and the others surround it compactly. Equally near places are taken by ascending y, then x.
+///
+/// The engine's own search is not known; this stands in for it. `taken` holds (x, y, separation radius) of everybody placed
+/// before and is extended.
+///
+/// Returns `None` if there is no room.
+#[must_use]
+pub fn spread_around(
+    point: [f32; 2],
+    profiles: &[&Profile],
+    terrain: &Terrain,
+    taken: &mut Vec<(f32, f32, f32)>,
+) -> Option<Vec<[f32; 2]>> {
+    let mut offsets: Vec<(i32, i32)> = (-REACH..=REACH)
+        .flat_map(|dy| (-REACH..=REACH).map(move |dx| (dy, dx)))
+        .collect();
+    offsets.sort_by_key(|&(dy, dx)| (dx * dx + dy * dy, dy, dx));
+    profiles
+        .iter()
+        .map(|profile| {
+            let radius = profile.separation_radius;
+            let place = offsets
+                .iter()
+                .map(|&(dy, dx)| {
+                    [
+                        point[0] + dx as f32 * LATTICE,
+                        point[1] + dy as f32 * LATTICE,
+                    ]
+                })
+                .find(|place| is_free(*place, profile, terrain, taken))?;
+            taken.push((place[0], place[1], radius));
+            Some(place)
+        })
+        .collect()
+}
+
+fn is_free(
+    [x, y]: [f32; 2],
+    profile: &Profile,
+    terrain: &Terrain,
+    taken: &[(f32, f32, f32)],
+) -> bool {
+    let is_clear_of_units = taken.iter().all(|(other_x, other_y, radius)| {
+        let (dx, dy) = (x - other_x, y - other_y);
+        let apart = radius + profile.separation_radius;
+        dx * dx + dy * dy >= apart * apart
+    });
+    is_clear_of_units && terrain.pushed_out_of_walls(x, y, profile.inner_radius) == (x, y)
+}

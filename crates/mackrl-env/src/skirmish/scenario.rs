@@ -1,0 +1,310 @@
+//! Maps: who fights whom, where, under which order.
+//!
+//! A map file states only what cannot be derived. Sizes, agent order, type bits and rewards follow from it.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use crate::skirmish::{
+    error::SkirmishError,
+    rules::{Battlefield, Profile, Team, spread_around},
+    terrain::{Terrain, TerrainName},
+    unit_types::{UnitType, UnitTypes},
+};
+
+/// Every shipped map, in the order in which they are listed: its name and its file.
+const MAPS: &[(&str, &str)] = &[
+    ("3m", include_str!("../../../../maps/3m.toml")),
+    ("8m", include_str!("../../../../maps/8m.toml")),
+    ("25m", include_str!("../../../../maps/25m.toml")),
+    ("5m_vs_6m", include_str!("../../../../maps/5m_vs_6m.toml")),
+    ("8m_vs_9m", include_str!("../../../../maps/8m_vs_9m.toml")),
+    (
+        "10m_vs_11m",
+        include_str!("../../../../maps/10m_vs_11m.toml"),
+    ),
+    (
+        "27m_vs_30m",
+        include_str!("../../../../maps/27m_vs_30m.toml"),
+    ),
+    ("2s3z", include_str!("../../../../maps/2s3z.toml")),
+    ("3s5z", include_str!("../../../../maps/3s5z.toml")),
+    (
+        "3s5z_vs_3s6z",
+        include_str!("../../../../maps/3s5z_vs_3s6z.toml"),
+    ),
+    ("3s_vs_3z", include_str!("../../../../maps/3s_vs_3z.toml")),
+    ("3s_vs_4z", include_str!("../../../../maps/3s_vs_4z.toml")),
+    ("3s_vs_5z", include_str!("../../../../maps/3s_vs_5z.toml")),
+    ("2m_vs_1z", include_str!("../../../../maps/2m_vs_1z.toml")),
+];
+
+/// A map file as it is written.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MapFile {
+    /// Where units can walk.
+    pub terrain: TerrainName,
+    /// Steps after which an episode is truncated, ≥ 1.
+    pub episode_limit: usize,
+    /// The agents' side.
+    pub allies: Allies,
+    /// The other side.
+    pub enemies: Enemies,
+}
+
+/// The agents' side.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Allies {
+    /// Its race; only protoss units are observed with shields.
+    pub race: Race,
+    /// Its units in order of creation.
+    pub groups: Vec<Group>,
+}
+
+/// The other side.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Enemies {
+    /// Its race.
+    pub race: Race,
+    /// What all of them are ordered at the start.
+    pub order: EnemyOrder,
+    /// Its units in order of creation.
+    pub groups: Vec<Group>,
+}
+
+/// Units that appear together around a point.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Group {
+    /// Name of the unit type.
+    pub unit: String,
+    /// How many, ≥ 1.
+    pub count: usize,
+    /// The point, in map units.
+    pub at: [f32; 2],
+}
+
+/// The peoples of StarCraft.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Race {
+    /// Humans.
+    Terran,
+    /// With shields.
+    Protoss,
+    /// Life grows back.
+    Zerg,
+}
+
+/// What enemies are ordered when they appear.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EnemyOrder {
+    /// Nothing: they fight what comes near.
+    None,
+    /// Attack-move to a point. The army keeps its formation, as a group does that is ordered beyond its own extent.
+    AttackMove([f32; 2]),
+    /// Attack-move to a random point between two, drawn once an episode.
+    AttackMoveBetween([[f32; 2]; 2]),
+    /// Attack the other side's units, wherever they are.
+    Hunt,
+}
+
+/// One unit at the start of an episode.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Recruit {
+    /// Index of its type among the battlefield's profiles.
+    pub kind: u8,
+    /// Its side.
+    pub team: Team,
+    /// Where it appears.
+    pub at: [f32; 2],
+}
+
+/// A map with everything looked up and placed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scenario {
+    /// Name in the registry.
+    pub name: String,
+    /// Steps after which an episode is truncated.
+    pub episode_limit: usize,
+    /// Terrain and unit types; types in alphabetical order, which is the order of SMAC's own type ids.
+    pub field: Arc<Battlefield>,
+    /// Everybody at the start: agents in their order (type, x, y), then enemies in order of creation.
+    pub recruits: Vec<Recruit>,
+    /// N: how many of `recruits` are agents.
+    pub agents: usize,
+    /// What enemies are ordered at the start.
+    pub enemy_order: EnemyOrder,
+    /// Middle of the enemies' places, which formations are relative to.
+    pub enemy_centre: [f32; 2],
+    /// Races of allies and enemies.
+    pub races: [Race; 2],
+    /// The game's numbers of the types, as `field.profiles`.
+    pub type_ids: Vec<u32>,
+}
+
+/// Names of all maps.
+#[must_use]
+pub fn map_names() -> Vec<&'static str> {
+    MAPS.iter().map(|(name, _)| *name).collect()
+}
+
+impl Scenario {
+    /// The shipped map called `name` with the given statistics; `None` if there is no such map.
+    #[must_use]
+    pub fn shipped(name: &str, units: &UnitTypes) -> Option<Result<Self, SkirmishError>> {
+        let (name, file) = MAPS.iter().find(|(shipped, _)| *shipped == name)?;
+        Some(Self::parse(name, file, units))
+    }
+
+    /// Reads a map file.
+    ///
+    /// # Errors
+    /// [`SkirmishError::MapFile`] for broken TOML, unknown keys, types or terrains, and armies that are empty, too large or
+    /// have no room.
+    pub fn parse(name: &str, text: &str, units: &UnitTypes) -> Result<Self, SkirmishError> {
+        let problem = |problem: String| SkirmishError::MapFile {
+            map: name.to_owned(),
+            problem,
+        };
+        let file: MapFile = toml::from_str(text).map_err(|error| problem(error.to_string()))?;
+        file.validate(units).map_err(problem)?;
+        Self::build(name, &file, units).map_err(problem)
+    }
+
+    fn build(name: &str, file: &MapFile, units: &UnitTypes) -> Result<Self, String> {
+        let mut names: Vec<&str> = file
+            .groups()
+            .map(|(_, group)| group.unit.as_str())
+            .collect();
+        names.sort_unstable();
+        names.dedup();
+        let types: Vec<&UnitType> = names.iter().filter_map(|name| units.find(name)).collect();
+        let field = Battlefield::new(Terrain::named(file.terrain), units, &types);
+        let recruits = place_armies(file, &field, &names)?;
+        let (mut allies, enemies): (Vec<Recruit>, Vec<Recruit>) = recruits
+            .into_iter()
+            .partition(|recruit| recruit.team == Team::Ally);
+        allies.sort_by(|a, b| {
+            let by_place = a.at[0]
+                .total_cmp(&b.at[0])
+                .then(a.at[1].total_cmp(&b.at[1]));
+            a.kind.cmp(&b.kind).then(by_place)
+        });
+        let middle = |axis: usize| {
+            enemies.iter().map(|enemy| enemy.at[axis]).sum::<f32>() / enemies.len() as f32
+        };
+        Ok(Self {
+            name: name.to_owned(),
+            episode_limit: file.episode_limit,
+            field: Arc::new(field),
+            agents: allies.len(),
+            enemy_centre: [middle(0), middle(1)],
+            recruits: allies.into_iter().chain(enemies).collect(),
+            enemy_order: file.enemies.order,
+            races: [file.allies.race, file.enemies.race],
+            type_ids: types.iter().map(|unit| unit.type_id).collect(),
+        })
+    }
+
+    /// Number of enemies.
+    #[must_use]
+    pub fn enemies(&self) -> usize {
+        self.recruits.len() - self.agents
+    }
+}
+
+impl MapFile {
+    fn groups(&self) -> impl Iterator<Item = (Team, &Group)> {
+        let allies = self.allies.groups.iter().map(|group| (Team::Ally, group));
+        allies.chain(self.enemies.groups.iter().map(|group| (Team::Enemy, group)))
+    }
+
+    fn validate(&self, units: &UnitTypes) -> Result<(), String> {
+        if !(1..=100_000).contains(&self.episode_limit) {
+            return Err(format!(
+                "episode_limit is {}, expected 1..=100000",
+                self.episode_limit
+            ));
+        }
+        let mut sizes = [0_usize; 2];
+        for (team, group) in self.groups() {
+            if units.find(&group.unit).is_none() {
+                return Err(format!(
+                    "no statistics for unit `{}`, expected one of {}",
+                    group.unit,
+                    units
+                        .types
+                        .iter()
+                        .map(|unit| unit.name.as_str())
+                        .collect::<Vec<_>>()
+                        .join(", ")
+                ));
+            }
+            if !(1..=100).contains(&group.count) {
+                return Err(format!(
+                    "a group has {} units, expected 1..=100",
+                    group.count
+                ));
+            }
+            check_point(group.at)?;
+            sizes[usize::from(team == Team::Enemy)] += group.count;
+        }
+        let [allies, enemies] = sizes;
+        if allies == 0 || enemies == 0 || allies + enemies > crate::EntitySet::CAPACITY {
+            return Err(format!(
+                "{allies} allies and {enemies} enemies, expected at least one each and at most {} in all",
+                crate::EntitySet::CAPACITY
+            ));
+        }
+        match self.enemies.order {
+            EnemyOrder::None | EnemyOrder::Hunt => Ok(()),
+            EnemyOrder::AttackMove(to) => check_point(to),
+            EnemyOrder::AttackMoveBetween(ends) => ends.into_iter().try_for_each(check_point),
+        }
+    }
+}
+
+fn check_point(point: [f32; 2]) -> Result<(), String> {
+    if point
+        .iter()
+        .all(|coordinate| (0.0..=32.0).contains(coordinate))
+    {
+        Ok(())
+    } else {
+        Err(format!(
+            "point {point:?} lies outside the map, expected coordinates in [0, 32]"
+        ))
+    }
+}
+
+fn place_armies(
+    file: &MapFile,
+    field: &Battlefield,
+    names: &[&str],
+) -> Result<Vec<Recruit>, String> {
+    let mut taken = Vec::new();
+    let mut recruits = Vec::new();
+    for (team, group) in file.groups() {
+        let kind = names
+            .iter()
+            .position(|name| *name == group.unit)
+            .unwrap_or_default();
+        let profiles: Vec<&Profile> = vec![&field.profiles[kind]; group.count];
+        let places =
+            spread_around(group.at, &profiles, &field.terrain, &mut taken).ok_or_else(|| {
+                format!(
+                    "no room for {} {} at {:?}",
+                    group.count, group.unit, group.at
+                )
+            })?;
+        let kind = u8::try_from(kind).map_err(|_| "more than 256 unit types".to_owned())?;
+        recruits.extend(places.into_iter().map(|at| Recruit { kind, team, at }));
+    }
+    Ok(recruits)
+}
