@@ -1,5 +1,5 @@
-use mackrl_env::*;
 use mackrl_env::skirmish::{SkirmishSettings, scripted::ScriptedPolicy};
+use mackrl_env::*;
 fn main() {
     let mut e = registry::make_skirmish("3m", &SkirmishSettings::default()).unwrap();
     let spec = e.spec().clone();
@@ -11,12 +11,20 @@ fn main() {
     for step in 0..40 {
         ScriptedPolicy::Nearest.act(&spec, prior.as_ref(), &o, 0, (key, step), &mut a);
         let ts = e.step(&a, &mut o.row_mut(0)).unwrap();
-        print!("{step} {:?} ", a.iter().map(|a| a.index()).collect::<Vec<_>>());
+        print!(
+            "{step} {:?} ",
+            a.iter().map(|a| a.index()).collect::<Vec<_>>()
+        );
         let s = e.battle().state();
         for (i, u) in s.units.iter().enumerate().filter(|_| step > 3) {
-            print!("| {:.2},{:.2} hp{} cd{:.1} q{:?} ", s.x[i], s.y[i], u.life, u.cooldown, u.quarry);
+            print!(
+                "| {:.2},{:.2} hp{} cd{:.1} q{:?} ",
+                s.x[i], s.y[i], u.life, u.cooldown, u.quarry
+            );
         }
         println!();
-        if ts.end.is_some() { break; }
+        if ts.end.is_some() {
+            break;
+        }
     }
 }

@@ -20,6 +20,7 @@ pub mod hierarchy;
 pub mod learner;
 pub mod marginalisation;
 pub mod nn;
+mod parallel;
 pub mod partition;
 pub mod policy;
 mod real;

@@ -6,10 +6,10 @@ use std::collections::BTreeSet;
 
 use mackrl::{
     common_knowledge::{common_knowledge, recursion::Recursion},
-    hierarchy::{Mode, Path, Sampler},
+    hierarchy::{Path, Sampler},
     marginalisation::reference::{Choice, Controller},
     partition::{Pairs, all_partitions},
-    policy::DELEGATE,
+    policy::{DELEGATE, Mode},
 };
 use mackrl_env::{Action, AgentId, Draw, EntityId, EntitySet, EpisodeKey, Stream};
 use support::{MASKED, Numbers, Tables, actions, assert_close, ids, log_softmax};

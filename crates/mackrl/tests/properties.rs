@@ -4,10 +4,10 @@ mod support;
 
 use mackrl::{
     common_knowledge::common_knowledge,
-    hierarchy::{Mode, PairChoice, Path, Sampler},
+    hierarchy::{PairChoice, Path, Sampler},
     marginalisation::reference::Controller,
     partition::{Pair, PartitionBuffer, PartitionSchedule},
-    policy::DELEGATE,
+    policy::{DELEGATE, Mode},
 };
 use mackrl_env::{Action, AgentId, EntitySet, EpisodeKey, Stream};
 use proptest::prelude::*;

@@ -1,1 +1,11 @@
 //! The critic V(state, last actions) and the returns that it learns from.
+//!
+//! The critic is central: it sees the state, which holds the last actions of all agents. It is needed for learning alone,
+//! so it takes nothing away from decentralised execution.
+
+mod critic;
+mod returns;
+
+pub(crate) use critic::not_finite;
+pub use critic::{CentralCritic, CriticReport, CriticSettings};
+pub use returns::{ReturnSettings, lambda_returns};

@@ -9,17 +9,8 @@ use mackrl_env::{Action, AgentId, Draw, EpisodeKey};
 use crate::{
     Real,
     partition::Pair,
-    policy::{DELEGATE, PolicyShape, PolicyTable},
+    policy::{DELEGATE, Mode, PolicyShape, PolicyTable},
 };
-
-/// How a controller chooses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mode {
-    /// At random, with the probabilities of its row.
-    Sampled,
-    /// The most probable entry; the lowest index among equals.
-    Greedy,
-}
 
 /// What a pair controller chose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

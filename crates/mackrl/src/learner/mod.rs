@@ -1,1 +1,208 @@
-//! On-policy actor-critic learning from the marginal probability of the joint action.
+//! On-policy actor-critic learning from the marginal probability of the joint action (eq. 6).
+//!
+//! One update takes a batch of whole episodes: the critic sweeps backwards through time and yields advantages, then the
+//! policy takes one step along Σ A_t ∇ log p(u_t). The learner sees episodes and actors, never an environment.
+//!
+//! Every shard has a gradient of its own, and they are summed in the order of the shards: the number of threads changes
+//! nothing.
+
+use mackrl_env::{EpisodeKey, Stream};
+
+use crate::{
+    Error,
+    central_critic::{CentralCritic, CriticReport, CriticSettings, not_finite},
+    nn::{Optimiser, OptimiserKind, clip_gradient_norm, first_not_finite},
+    parallel::for_each_in_parallel,
+    policy::{Policy, Weights},
+    rollout::{Episode, ShardBatch},
+};
+
+/// How the policy learns.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LearnerSettings {
+    /// How parameters follow the gradient.
+    pub optimiser: OptimiserKind,
+    /// Step size, > 0.
+    pub learning_rate: f64,
+    /// Largest norm of the policy's gradient, > 0; longer ones are scaled down.
+    pub gradient_norm_max: f64,
+    /// How the critic learns.
+    pub critic: CriticSettings,
+}
+
+/// What one update did.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct UpdateReport {
+    /// −mean of A_t log p(u_t), per agent.
+    pub policy_loss: f64,
+    /// Norm of the policy's gradient before clipping.
+    pub policy_gradient_norm: f64,
+    /// Mean of A_t.
+    pub advantage_mean: f64,
+    /// What the critic's sweep did.
+    pub critic: CriticReport,
+}
+
+/// The policy's parameters, the critic, and how both change.
+#[derive(Debug)]
+pub struct Learner {
+    settings: LearnerSettings,
+    agents: usize,
+    threads: usize,
+    parameters: Vec<f32>,
+    weights: Weights,
+    optimiser: Optimiser<f32>,
+    critic: CentralCritic,
+    shard_gradients: Vec<Vec<f32>>,
+    advantage_bt: Vec<Vec<f32>>,
+    updates: u64,
+}
+
+/// One shard's part of the backward pass.
+struct ShardWork<'a> {
+    batch: &'a mut ShardBatch,
+    gradient: &'a mut Vec<f32>,
+    weight_bt: Vec<Vec<f32>>,
+    objective: f64,
+}
+
+impl Learner {
+    /// A learner for `policy` in a world of `agents` agents and states of `state_size` numbers, with initial parameters drawn
+    /// from `seed`. `threads` changes no result.
+    #[must_use]
+    pub fn new(
+        policy: &dyn Policy,
+        [agents, state_size]: [usize; 2],
+        settings: LearnerSettings,
+        seed: u64,
+        threads: usize,
+    ) -> Self {
+        let parameters = policy.initialise(seed);
+        let critic_key = EpisodeKey::new(seed, Stream::Other, 1);
+        Self {
+            settings,
+            agents,
+            threads,
+            weights: policy.weights(&parameters),
+            optimiser: Optimiser::new(settings.optimiser, parameters.len()),
+            critic: CentralCritic::new(state_size, settings.critic, &critic_key),
+            shard_gradients: Vec::new(),
+            advantage_bt: Vec::new(),
+            updates: 0,
+            parameters,
+        }
+    }
+
+    /// The policy's parameters.
+    #[must_use]
+    pub fn parameters(&self) -> &[f32] {
+        &self.parameters
+    }
+
+    /// The policy's weights, as actors use them.
+    #[must_use]
+    pub const fn weights(&self) -> &Weights {
+        &self.weights
+    }
+
+    /// The critic.
+    #[must_use]
+    pub const fn critic(&self) -> &CentralCritic {
+        &self.critic
+    }
+
+    /// Number of policy updates so far.
+    #[must_use]
+    pub const fn updates(&self) -> u64 {
+        self.updates
+    }
+
+    /// Learns from the batch that `shards` hold.
+    ///
+    /// # Equation
+    /// ∇J = 1 / (N Σ_b T_b) Σ_{b,t} A_{bt} ∇ log p(u_{bt}) (eq. 6), then one step of the optimiser.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] if a gradient is not finite. The policy has not changed then.
+    pub fn update(
+        &mut self,
+        policy: &dyn Policy,
+        shards: Vec<&mut ShardBatch>,
+    ) -> Result<UpdateReport, Error> {
+        let episodes: Vec<&Episode> = shards.iter().flat_map(|shard| &shard.episodes).collect();
+        let steps: usize = episodes.iter().map(|episode| episode.steps()).sum();
+        let critic = self.critic.sweep(&episodes, &mut self.advantage_bt)?;
+        let advantages = self.advantage_bt.iter().flatten();
+        let advantage_mean = advantages.map(|&a| f64::from(a)).sum::<f64>() / steps as f64;
+        let objective = self.backward(shards, steps);
+        let gradient = &mut self.shard_gradients[0];
+        if let Some(index) = first_not_finite(gradient) {
+            let layout = policy.layout();
+            return Err(not_finite(
+                layout,
+                "gradient of",
+                index,
+                gradient,
+                self.updates,
+            ));
+        }
+        let norm = clip_gradient_norm(gradient, self.settings.gradient_norm_max);
+        self.optimiser
+            .step(self.settings.learning_rate, gradient, &mut self.parameters);
+        policy.refresh(&self.parameters, &mut self.weights);
+        self.updates += 1;
+        Ok(UpdateReport {
+            policy_loss: -objective,
+            policy_gradient_norm: norm,
+            advantage_mean,
+            critic,
+        })
+    }
+
+    /// Computes the gradient of −J into the first shard's gradient and returns J.
+    fn backward(&mut self, shards: Vec<&mut ShardBatch>, steps: usize) -> f64 {
+        let parameters = self.parameters.len();
+        self.shard_gradients
+            .resize_with(shards.len(), || vec![0.0; parameters]);
+        // Descending on −J: the weights carry the minus sign and the mean over steps and agents.
+        let scale = -1.0 / (steps * self.agents) as f32;
+        let mut rest = self.advantage_bt.as_slice();
+        let mut work: Vec<ShardWork<'_>> = shards
+            .into_iter()
+            .zip(&mut self.shard_gradients)
+            .map(|(batch, gradient)| {
+                let (own, others) = rest.split_at(batch.episodes.len());
+                rest = others;
+                let scaled =
+                    |advantage_t: &Vec<f32>| advantage_t.iter().map(|a| scale * a).collect();
+                let weight_bt = own.iter().map(scaled).collect();
+                ShardWork {
+                    batch,
+                    gradient,
+                    weight_bt,
+                    objective: 0.0,
+                }
+            })
+            .collect();
+        let weights = &self.weights;
+        for_each_in_parallel(self.threads, &mut work, |shard| {
+            shard.gradient.fill(0.0);
+            let loss = shard
+                .batch
+                .actor
+                .backward(weights, &shard.weight_bt, shard.gradient);
+            shard.objective = -loss;
+        });
+        let objective = work.iter().map(|shard| shard.objective).sum();
+        drop(work);
+        if let Some((first, others)) = self.shard_gradients.split_first_mut() {
+            for other in others {
+                first
+                    .iter_mut()
+                    .zip(other.iter())
+                    .for_each(|(sum, term)| *sum += term);
+            }
+        }
+        objective
+    }
+}

@@ -1,10 +1,12 @@
 //! Which partitions the pair selector may choose from, at every step of a run.
 
+use std::collections::BTreeSet;
+
 use mackrl_env::{AgentId, EpisodeKey};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Pairs, Partition, all_partitions, partition_count, round_robin, sample::shuffle,
+    Pair, Pairs, Partition, all_partitions, partition_count, round_robin, sample::shuffle,
     sample_partitions,
 };
 use crate::Error;
@@ -88,6 +90,20 @@ impl Partitions {
     #[must_use]
     pub fn count(&self) -> usize {
         self.fixed.len().max(1)
+    }
+
+    /// The pairs that may be formed at some step, ascending by index.
+    #[must_use]
+    pub fn possible_pairs(&self) -> Vec<Pair> {
+        if self.fixed.is_empty() {
+            return self.pairs.iter().collect();
+        }
+        let formed: BTreeSet<Pair> = self
+            .fixed
+            .iter()
+            .flat_map(|partition| partition.pairs().iter().copied())
+            .collect();
+        formed.into_iter().collect()
     }
 
     /// The P partitions in force at `step` of the episode named `key`: a pure function of the two and of the plan.

@@ -1,0 +1,270 @@
+//! The central critic and its sweep backwards through time.
+
+use mackrl_env::{EpisodeEnd, EpisodeKey};
+
+use super::{ReturnSettings, lambda_returns};
+use crate::{
+    Error,
+    nn::{
+        FeedForward, FeedForwardTrace, FeedForwardWeights, NetworkSizes, Optimiser, OptimiserKind,
+        ParameterLayout, clip_gradient_norm, first_not_finite,
+    },
+    rollout::Episode,
+};
+
+/// How the critic learns.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CriticSettings {
+    /// H: width of the hidden layer, at least 1.
+    pub hidden: usize,
+    /// How parameters follow the gradient.
+    pub optimiser: OptimiserKind,
+    /// Step size, > 0.
+    pub learning_rate: f64,
+    /// Largest norm of a gradient, > 0; longer ones are scaled down.
+    pub gradient_norm_max: f64,
+    /// γ and λ of the returns.
+    pub returns: ReturnSettings,
+    /// Critic updates after which the target copy is refreshed.
+    pub target_interval_updates: u64,
+    /// Whether the state at which time ran out has a value; otherwise a time limit counts as the end of the game.
+    pub bootstrap_at_time_limit: bool,
+}
+
+/// What one sweep did; means over its updates.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct CriticReport {
+    /// Mean squared error to the λ-returns.
+    pub loss: f64,
+    /// Norm of the gradient before clipping.
+    pub gradient_norm: f64,
+    /// Mean |λ-return − V|.
+    pub td_error_abs: f64,
+    /// Mean λ-return.
+    pub target_mean: f64,
+}
+
+/// V(s), a feed-forward network, with a target copy.
+#[derive(Debug)]
+pub struct CentralCritic {
+    settings: CriticSettings,
+    layout: ParameterLayout,
+    network: FeedForward,
+    parameters: Vec<f32>,
+    weights: FeedForwardWeights<f32>,
+    target_weights: FeedForwardWeights<f32>,
+    optimiser: Optimiser<f32>,
+    gradient: Vec<f32>,
+    trace: FeedForwardTrace<f32>,
+    updates: u64,
+    updates_at_refresh: u64,
+}
+
+/// What the sweep keeps of one episode.
+#[derive(Debug, Default)]
+struct Sweep {
+    /// λ-returns \[T\].
+    return_t: Vec<f32>,
+    /// r_t + γ V(s_{t+1}) − V(s_t) \[T\].
+    advantage_t: Vec<f32>,
+    /// V(s_{t+1}) as it was when the sweep passed it.
+    next_value: f32,
+}
+
+impl CentralCritic {
+    /// A critic for states of `state_size` numbers; initial parameters are drawn from `key`.
+    #[must_use]
+    pub fn new(state_size: usize, settings: CriticSettings, key: &EpisodeKey) -> Self {
+        let sizes = NetworkSizes {
+            inputs: state_size,
+            hidden: settings.hidden,
+            outputs: 1,
+        };
+        let mut layout = ParameterLayout::new();
+        let network = FeedForward::new(&mut layout, "critic", sizes);
+        let mut parameters = vec![0.0; layout.len()];
+        network.initialise(key, &mut parameters);
+        Self {
+            settings,
+            weights: network.weights(&parameters),
+            target_weights: network.weights(&parameters),
+            optimiser: Optimiser::new(settings.optimiser, parameters.len()),
+            gradient: vec![0.0; parameters.len()],
+            trace: FeedForwardTrace::new(sizes),
+            layout,
+            network,
+            parameters,
+            updates: 0,
+            updates_at_refresh: 0,
+        }
+    }
+
+    /// Names and shapes of the parameters.
+    #[must_use]
+    pub const fn layout(&self) -> &ParameterLayout {
+        &self.layout
+    }
+
+    /// The parameters.
+    #[must_use]
+    pub fn parameters(&self) -> &[f32] {
+        &self.parameters
+    }
+
+    /// Learns from a batch of episodes and writes their advantages.
+    ///
+    /// Targets come from the target copy and are fixed before the sweep. Then, from the last time step to the first, the
+    /// critic takes one optimiser step on the states of that time step (one per episode that lasted so long). Advantages use
+    /// the values that the sweep meets on its way: V(s_{t+1}) before, V(s_t) after the update at t + 1.
+    ///
+    /// # Shapes
+    /// `advantage_bt` becomes \[B\]\[T_b\].
+    ///
+    /// # Equation
+    /// A_t = r_t + γ V(s_{t+1}) − V(s_t), with V = 0 after the end (eq. 6).
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] if a gradient is not finite; parameters are then as after the step before.
+    pub fn sweep(
+        &mut self,
+        episodes: &[&Episode],
+        advantage_bt: &mut Vec<Vec<f32>>,
+    ) -> Result<CriticReport, Error> {
+        self.refresh_target_if_due();
+        let mut sweeps: Vec<Sweep> = episodes
+            .iter()
+            .map(|episode| self.prepare_sweep(episode))
+            .collect();
+        let longest = episodes
+            .iter()
+            .map(|episode| episode.steps())
+            .max()
+            .unwrap_or(0);
+        let mut total = CriticReport::default();
+        for t in (0..longest).rev() {
+            let report = self.update(t, episodes, &mut sweeps)?;
+            total.loss += report.loss / longest as f64;
+            total.gradient_norm += report.gradient_norm / longest as f64;
+            total.td_error_abs += report.td_error_abs / longest as f64;
+            total.target_mean += report.target_mean / longest as f64;
+        }
+        advantage_bt.clear();
+        advantage_bt.extend(sweeps.into_iter().map(|sweep| sweep.advantage_t));
+        Ok(total)
+    }
+
+    fn refresh_target_if_due(&mut self) {
+        if self.updates - self.updates_at_refresh >= self.settings.target_interval_updates {
+            self.network
+                .refresh(&self.parameters, &mut self.target_weights);
+            self.updates_at_refresh = self.updates;
+        }
+    }
+
+    /// Computes an episode's λ-returns from the target copy.
+    fn prepare_sweep(&mut self, episode: &Episode) -> Sweep {
+        let steps = episode.steps();
+        self.trace
+            .begin(steps + 1)
+            .copy_from_slice(&episode.state_tg);
+        self.network.forward(&self.target_weights, &mut self.trace);
+        let mut value_t = self.trace.outputs().to_vec();
+        let mut next_value = 0.0;
+        if self.settings.bootstrap_at_time_limit && episode.end == Some(EpisodeEnd::Truncated) {
+            self.trace.begin(1).copy_from_slice(episode.state(steps));
+            self.network.forward(&self.weights, &mut self.trace);
+            next_value = self.trace.outputs()[0];
+        } else {
+            value_t[steps] = 0.0;
+        }
+        let mut return_t = vec![0.0; steps];
+        lambda_returns(
+            self.settings.returns,
+            &episode.reward_t,
+            &value_t,
+            &mut return_t,
+        );
+        Sweep {
+            return_t,
+            advantage_t: vec![0.0; steps],
+            next_value,
+        }
+    }
+
+    /// One optimiser step on the states at time `t`.
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "γ is rounded to the networks' precision"
+    )]
+    fn update(
+        &mut self,
+        t: usize,
+        episodes: &[&Episode],
+        sweeps: &mut [Sweep],
+    ) -> Result<CriticReport, Error> {
+        let gamma = self.settings.returns.gamma as f32;
+        let live = || (0..episodes.len()).filter(|&b| t < episodes[b].steps());
+        let rows = live().count();
+        let input = self.trace.begin(rows);
+        let state_size = input.len() / rows;
+        for (state_g, b) in input.chunks_mut(state_size).zip(live()) {
+            state_g.copy_from_slice(episodes[b].state(t));
+        }
+        self.network.forward(&self.weights, &mut self.trace);
+        let mut report = CriticReport::default();
+        let (values, value_gradients) = self.trace.outputs_and_gradient_mut();
+        for ((&value, value_gradient), b) in values.iter().zip(value_gradients).zip(live()) {
+            let sweep = &mut sweeps[b];
+            let error = value - sweep.return_t[t];
+            *value_gradient = 2.0 * error / rows as f32;
+            sweep.advantage_t[t] = episodes[b].reward_t[t] + gamma * sweep.next_value - value;
+            sweep.next_value = value;
+            report.loss += f64::from(error * error) / rows as f64;
+            report.td_error_abs += f64::from(error.abs()) / rows as f64;
+            report.target_mean += f64::from(sweep.return_t[t]) / rows as f64;
+        }
+        self.gradient.fill(0.0);
+        self.network
+            .backward(&self.weights, &mut self.trace, &mut self.gradient);
+        if let Some(index) = first_not_finite(&self.gradient) {
+            return Err(not_finite(
+                &self.layout,
+                "gradient of",
+                index,
+                &self.gradient,
+                self.updates,
+            ));
+        }
+        report.gradient_norm =
+            clip_gradient_norm(&mut self.gradient, self.settings.gradient_norm_max);
+        let Self {
+            optimiser,
+            settings,
+            gradient,
+            parameters,
+            ..
+        } = self;
+        optimiser.step(settings.learning_rate, gradient, parameters);
+        self.network.refresh(&self.parameters, &mut self.weights);
+        self.updates += 1;
+        Ok(report)
+    }
+}
+
+/// The error for a number that is not finite at `index` of a flat vector.
+pub(crate) fn not_finite(
+    layout: &ParameterLayout,
+    what: &str,
+    index: usize,
+    values: &[f32],
+    update: u64,
+) -> Error {
+    let tensor = layout
+        .tensor_at(index)
+        .map_or("unknown tensor", |tensor| tensor.name.as_str());
+    Error::NotFinite {
+        tensor: format!("{what} {tensor}"),
+        value: f64::from(values[index]),
+        update,
+    }
+}

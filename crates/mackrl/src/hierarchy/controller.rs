@@ -1,0 +1,306 @@
+//! What all controllers have in common: Linear → ReLU → GRU → Linear → masked softmax with bounded exploration.
+//!
+//! A [`Controller`] is the network; a [`ControllerMemory`] holds the rows that it works on, one per instance that still
+//! acts (a pair in an environment, say). Rows may leave between steps; those that stay keep their recurrence.
+
+use mackrl_env::EpisodeKey;
+
+use crate::{
+    nn::{
+        MaskedLogSoftmax, NetworkSizes, ParameterLayout, RecurrentNetwork, RecurrentWeights,
+        Retention, Trace,
+    },
+    policy::{ControllerId, ControllerInput, Recording},
+};
+
+/// No row.
+const ABSENT: usize = usize::MAX;
+
+/// One controller's network.
+#[derive(Debug, Clone)]
+pub(crate) struct Controller {
+    network: RecurrentNetwork,
+}
+
+impl Controller {
+    /// Adds the controller's parameters to `layout`.
+    pub(crate) fn new(layout: &mut ParameterLayout, name: &str, sizes: NetworkSizes) -> Self {
+        Self {
+            network: RecurrentNetwork::new(layout, name, sizes),
+        }
+    }
+
+    /// Draws the controller's initial parameters.
+    pub(crate) fn initialise(&self, key: &EpisodeKey, parameters: &mut [f32]) {
+        self.network.initialise(key, parameters);
+    }
+
+    /// The weights in the form that rows are computed with.
+    pub(crate) fn weights(&self, parameters: &[f32]) -> RecurrentWeights<f32> {
+        self.network.weights(parameters)
+    }
+
+    /// Brings the weights up to date with the parameters.
+    pub(crate) fn refresh(&self, parameters: &[f32], weights: &mut RecurrentWeights<f32>) {
+        self.network.refresh(parameters, weights);
+    }
+}
+
+/// The rows of one controller over an episode.
+#[derive(Debug)]
+pub(crate) struct ControllerMemory {
+    sizes: NetworkSizes,
+    recording: Recording,
+    trace: Trace<f32>,
+    /// The row of each instance at this step and at the one before, [`ABSENT`] for those that have left.
+    row_of: Vec<usize>,
+    previous_row_of: Vec<usize>,
+    carry: Vec<usize>,
+    /// Rows before this step, of those that `log_p` and `softmax` hold.
+    first_row: usize,
+    rows: usize,
+    mask_rc: Vec<bool>,
+    /// \[rows, C\], of all steps if they are recorded, else of this one.
+    log_p_rc: Vec<f32>,
+    softmax_rc: Vec<f32>,
+    exploration: f32,
+    choices: Vec<Choice>,
+}
+
+/// That log p(u) of one step depends on one entry of a row.
+#[derive(Debug, Clone, Copy)]
+struct Choice {
+    step: usize,
+    environment: usize,
+    /// Row within its step.
+    row: usize,
+    column: usize,
+    /// ∂ log p(u) / ∂ log p of the entry: a posterior probability.
+    posterior: f32,
+}
+
+impl ControllerMemory {
+    pub(crate) fn new(controller: &Controller) -> Self {
+        let sizes = controller.network.sizes();
+        Self {
+            sizes,
+            recording: Recording::Off,
+            trace: Trace::new(sizes, Retention::LastStep),
+            row_of: Vec::new(),
+            previous_row_of: Vec::new(),
+            carry: Vec::new(),
+            first_row: 0,
+            rows: 0,
+            mask_rc: Vec::new(),
+            log_p_rc: Vec::new(),
+            softmax_rc: Vec::new(),
+            exploration: 0.0,
+            choices: Vec::new(),
+        }
+    }
+
+    /// Forgets all steps; recurrences start at zero.
+    pub(crate) fn begin(&mut self, recording: Recording) {
+        if self.recording != recording {
+            self.recording = recording;
+            let retention = match recording {
+                Recording::ForLearning => Retention::Episode,
+                Recording::Off => Retention::LastStep,
+            };
+            self.trace = Trace::new(self.sizes, retention);
+        }
+        self.trace.begin_episode();
+        self.previous_row_of.clear();
+        self.row_of.clear();
+        self.first_row = 0;
+        self.rows = 0;
+        self.choices.clear();
+    }
+
+    /// Begins a step with one row for each of `instances`. An instance that was there before goes on where it was; after
+    /// the first step, none joins.
+    ///
+    /// # Panics
+    /// If an instance joins after the first step.
+    pub(crate) fn begin_step(&mut self, instances: impl IntoIterator<Item = usize>) {
+        std::mem::swap(&mut self.row_of, &mut self.previous_row_of);
+        self.row_of.clear();
+        self.carry.clear();
+        for (row, instance) in instances.into_iter().enumerate() {
+            if self.row_of.len() <= instance {
+                self.row_of.resize(instance + 1, ABSENT);
+            }
+            self.row_of[instance] = row;
+            self.carry.push(
+                self.previous_row_of
+                    .get(instance)
+                    .copied()
+                    .unwrap_or(ABSENT),
+            );
+        }
+        let is_first = self.trace.steps() == 0;
+        assert!(
+            is_first || !self.carry.contains(&ABSENT),
+            "no controller joins after the first step of an episode"
+        );
+        let unchanged = is_first
+            || self.carry.len() == self.rows && self.carry.iter().enumerate().all(|(i, &c)| i == c);
+        self.first_row = match self.recording {
+            Recording::ForLearning => self.first_row + self.rows,
+            Recording::Off => 0,
+        };
+        self.rows = self.carry.len();
+        self.trace
+            .begin_step(self.rows, (!unchanged).then_some(self.carry.as_slice()));
+        let columns = self.sizes.outputs;
+        grow(&mut self.mask_rc, self.rows * columns);
+        grow(&mut self.log_p_rc, (self.first_row + self.rows) * columns);
+        grow(&mut self.softmax_rc, (self.first_row + self.rows) * columns);
+    }
+
+    /// The input and the mask of a row of this step, to be filled; the input is zero when the step begins.
+    ///
+    /// # Shapes
+    /// Input \[F\], mask \[C\].
+    pub(crate) fn row_mut(&mut self, row: usize) -> (&mut [f32], &mut [bool]) {
+        let NetworkSizes {
+            inputs, outputs, ..
+        } = self.sizes;
+        (
+            &mut self.trace.input_mut()[row * inputs..(row + 1) * inputs],
+            &mut self.mask_rc[row * outputs..(row + 1) * outputs],
+        )
+    }
+
+    /// Computes the log-probabilities of all rows of this step.
+    pub(crate) fn run(
+        &mut self,
+        controller: &Controller,
+        weights: &RecurrentWeights<f32>,
+        exploration: f32,
+    ) {
+        self.exploration = exploration;
+        if self.rows == 0 {
+            return;
+        }
+        controller.network.step(weights, &mut self.trace);
+        let columns = self.sizes.outputs;
+        let place = self.first_row * columns..(self.first_row + self.rows) * columns;
+        self.softmax().forward(
+            self.trace.last_logits(),
+            &self.mask_rc[..self.rows * columns],
+            &mut self.log_p_rc[place.clone()],
+            &mut self.softmax_rc[place],
+        );
+    }
+
+    /// The log-probabilities \[C\] of a row of this step.
+    pub(crate) fn log_p(&self, row: usize) -> &[f32] {
+        let columns = self.sizes.outputs;
+        &self.log_p_rc[(self.first_row + row) * columns..(self.first_row + row + 1) * columns]
+    }
+
+    /// The row of `instance` at this step, if it is there.
+    pub(crate) fn row_of(&self, instance: usize) -> Option<usize> {
+        self.row_of
+            .get(instance)
+            .copied()
+            .filter(|&row| row != ABSENT)
+    }
+
+    /// What a row of this step reads, under the name of its controller.
+    pub(crate) fn input(&self, row: usize, controller: ControllerId) -> ControllerInput {
+        let inputs = self.sizes.inputs;
+        let all = self.trace.inputs(self.trace.steps() - 1);
+        ControllerInput {
+            controller,
+            values: all[row * inputs..(row + 1) * inputs].to_vec(),
+        }
+    }
+
+    /// Notes that log p(u) of this step in `environment` depends on an entry of a row with the weight `posterior`.
+    pub(crate) fn record(&mut self, row: usize, column: usize, environment: usize, posterior: f32) {
+        if posterior != 0.0 {
+            let step = self.trace.steps() - 1;
+            self.choices.push(Choice {
+                step,
+                environment,
+                row,
+                column,
+                posterior,
+            });
+        }
+    }
+
+    /// Adds Σ `weight_bt` ∇ log p(u) over all recorded choices to `gradient`.
+    ///
+    /// # Shapes
+    /// `weight_bt` \[B\]\[T_b\].
+    pub(crate) fn backward(
+        &mut self,
+        controller: &Controller,
+        weights: &RecurrentWeights<f32>,
+        weight_bt: &[Vec<f32>],
+        gradient: &mut [f32],
+    ) {
+        let columns = self.sizes.outputs;
+        let softmax = self.softmax();
+        // Choices were noted environment by environment; the gradient is written row by row.
+        self.choices
+            .sort_unstable_by_key(|choice| (choice.step, choice.row, choice.column));
+        let mut rest = self.choices.as_slice();
+        let mut entries = Vec::with_capacity(columns);
+        let mut row_over_all = 0;
+        for t in 0..self.trace.steps() {
+            let rows = self.trace.rows(t);
+            let step_gradient = self.trace.logits_gradient_mut(t);
+            for (row, row_gradient) in step_gradient.chunks_exact_mut(columns).enumerate() {
+                let count = rest
+                    .iter()
+                    .take_while(|c| (c.step, c.row) == (t, row))
+                    .count();
+                let (own, others) = rest.split_at(count);
+                rest = others;
+                entries.clear();
+                entries.extend(own.iter().map(|choice| {
+                    (
+                        choice.column,
+                        choice.posterior * weight_bt[choice.environment][t],
+                    )
+                }));
+                let place = row_over_all * columns..(row_over_all + 1) * columns;
+                row_over_all += 1;
+                softmax.row_gradient(
+                    &self.log_p_rc[place.clone()],
+                    &self.softmax_rc[place],
+                    &entries,
+                    row_gradient,
+                );
+            }
+            debug_assert_eq!(
+                step_gradient.len(),
+                rows * columns,
+                "a gradient for every row"
+            );
+        }
+        if row_over_all > 0 {
+            controller
+                .network
+                .backward(weights, &mut self.trace, gradient);
+        }
+    }
+
+    const fn softmax(&self) -> MaskedLogSoftmax<f32> {
+        MaskedLogSoftmax {
+            columns: self.sizes.outputs,
+            epsilon: self.exploration,
+        }
+    }
+}
+
+/// Makes room for `len` elements; never shrinks.
+fn grow<T: Clone + Default>(buffer: &mut Vec<T>, len: usize) {
+    if buffer.len() < len {
+        buffer.resize(len, T::default());
+    }
+}

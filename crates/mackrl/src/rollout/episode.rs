@@ -1,0 +1,59 @@
+//! What the learner needs of an episode, stored once.
+
+use mackrl_env::{EpisodeEnd, EpisodeStatistics, Observations};
+
+use crate::policy::Recording;
+
+/// One episode of one environment, without the activations that the actor keeps.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Episode {
+    /// States \[T + 1, G\]: before each step, and after the last; empty unless recorded for learning.
+    pub state_tg: Vec<f32>,
+    /// Rewards \[T\].
+    pub reward_t: Vec<f32>,
+    /// Why the episode ended; `None` while it runs.
+    pub end: Option<EpisodeEnd>,
+    /// How it ended.
+    pub statistics: EpisodeStatistics,
+}
+
+impl Episode {
+    /// T: the number of steps played.
+    #[must_use]
+    pub const fn steps(&self) -> usize {
+        self.reward_t.len()
+    }
+
+    /// Σ_t r_t, undiscounted.
+    #[must_use]
+    pub fn total_reward(&self) -> f64 {
+        self.reward_t.iter().map(|&reward| f64::from(reward)).sum()
+    }
+
+    /// The state \[G\] before step `t`, or after the last step for t = T.
+    #[must_use]
+    pub fn state(&self, t: usize) -> &[f32] {
+        let size = self.state_tg.len() / (self.steps() + 1);
+        &self.state_tg[t * size..(t + 1) * size]
+    }
+
+    /// Forgets everything but the memory.
+    pub(super) fn clear(&mut self) {
+        self.state_tg.clear();
+        self.reward_t.clear();
+        self.end = None;
+        self.statistics = EpisodeStatistics::default();
+    }
+
+    /// Appends the state of environment `b`, if it will be needed.
+    pub(super) fn remember_state(
+        &mut self,
+        recording: Recording,
+        observations: &Observations,
+        b: usize,
+    ) {
+        if recording == Recording::ForLearning {
+            self.state_tg.extend_from_slice(observations.state(b));
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! A shard: a few environments, the actor that plays in them, and the episodes that come out.
+
+use std::fmt;
+
+use mackrl_env::{Action, Environment, EpisodeKey, Observations};
+
+use super::{Episode, RolloutSettings};
+use crate::{
+    Error,
+    policy::{Actor, Situation, Weights},
+};
+
+/// A shard's episodes and the actor that still holds their activations: all that the learner sees.
+pub struct ShardBatch {
+    /// The episodes of the latest rollout, at most one per environment.
+    pub episodes: Vec<Episode>,
+    /// Who played them.
+    pub actor: Box<dyn Actor>,
+}
+
+/// Some environments that are stepped together by one actor.
+pub struct Shard {
+    environments: Vec<Box<dyn Environment>>,
+    observations: Observations,
+    actions_bn: Vec<Action>,
+    agents: usize,
+    batch: ShardBatch,
+}
+
+impl Shard {
+    /// A shard of `environments`, all of the same kind, played by `actor`.
+    ///
+    /// # Panics
+    /// If there is no environment.
+    #[must_use]
+    pub fn new(environments: Vec<Box<dyn Environment>>, actor: Box<dyn Actor>) -> Self {
+        let spec = environments
+            .first()
+            .expect("a shard has at least one environment")
+            .spec();
+        let agents = spec.agents;
+        let observations = Observations::new(spec, environments.len());
+        Self {
+            actions_bn: vec![Action::default(); environments.len() * agents],
+            environments,
+            observations,
+            agents,
+            batch: ShardBatch {
+                episodes: Vec::new(),
+                actor,
+            },
+        }
+    }
+
+    /// Number of environments.
+    #[must_use]
+    pub fn environments(&self) -> usize {
+        self.environments.len()
+    }
+
+    /// The latest episodes and their actor.
+    pub const fn batch(&mut self) -> &mut ShardBatch {
+        &mut self.batch
+    }
+
+    /// Plays the episodes named `keys`, at most one per environment, to their ends.
+    ///
+    /// # Errors
+    /// If an environment refuses an action, which means that the policy's masks disagree with it.
+    pub fn play(
+        &mut self,
+        weights: &Weights,
+        keys: &[EpisodeKey],
+        settings: RolloutSettings,
+    ) -> Result<(), Error> {
+        self.batch
+            .episodes
+            .resize_with(keys.len(), Episode::default);
+        self.batch.actor.begin(settings.recording);
+        for (b, key) in keys.iter().enumerate() {
+            self.environments[b].reset(*key, &mut self.observations.row_mut(b));
+            self.batch.episodes[b].clear();
+            self.batch.episodes[b].remember_state(settings.recording, &self.observations, b);
+        }
+        let mut playing: Vec<usize> = (0..keys.len()).collect();
+        for step in 0.. {
+            if playing.is_empty() {
+                break;
+            }
+            let situation = Situation {
+                step,
+                playing: &playing,
+                keys,
+                observations: &self.observations,
+                behaviour: settings.behaviour,
+            };
+            self.batch
+                .actor
+                .act(weights, situation, &mut self.actions_bn);
+            for &b in &playing {
+                self.step(b, settings)?;
+            }
+            playing.retain(|&b| self.batch.episodes[b].end.is_none());
+        }
+        Ok(())
+    }
+
+    /// Plays the chosen actions in environment `b`.
+    fn step(&mut self, b: usize, settings: RolloutSettings) -> Result<(), Error> {
+        let actions = &self.actions_bn[b * self.agents..(b + 1) * self.agents];
+        let time_step = self.environments[b].step(actions, &mut self.observations.row_mut(b))?;
+        let episode = &mut self.batch.episodes[b];
+        episode.reward_t.push(time_step.reward);
+        episode.end = time_step.end;
+        episode.remember_state(settings.recording, &self.observations, b);
+        if time_step.end.is_some() {
+            episode.statistics = self.environments[b].statistics();
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Debug for ShardBatch {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter
+            .debug_struct("ShardBatch")
+            .field("episodes", &self.episodes)
+            .finish_non_exhaustive()
+    }
+}
+
+impl fmt::Debug for Shard {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter
+            .debug_struct("Shard")
+            .field("batch", &self.batch)
+            .finish_non_exhaustive()
+    }
+}
