@@ -33,7 +33,7 @@ pub enum OptimiserKind {
     /// Adam (Kingma and Ba, 2015), as the paper says.
     #[default]
     Adam,
-    /// RMSprop, as the authors' code.
+    /// `RMSprop`, as the authors' code.
     Rmsprop,
 }
 

@@ -85,6 +85,16 @@ pub enum ConfigError {
         /// Which values are accepted.
         expected: String,
     },
+    /// A map that is not in the registry.
+    #[error("{origin}: unknown map `{name}`{}", suggestion(nearest.as_deref()))]
+    UnknownMap {
+        /// Where.
+        origin: Origin,
+        /// Its name.
+        name: String,
+        /// The most similar name, if one is similar at all.
+        nearest: Option<String>,
+    },
     /// A preset that is not shipped.
     #[error("unknown preset `{name}`, expected {expected}{}", suggestion(nearest.as_deref()))]
     UnknownPreset {
@@ -95,6 +105,22 @@ pub enum ConfigError {
         /// The most similar name, if one is similar at all.
         nearest: Option<String>,
     },
+}
+
+impl ConfigError {
+    /// The error for a map `name` that is not among the `known` ones.
+    #[must_use]
+    pub fn unknown_map<'a>(
+        origin: Origin,
+        name: &str,
+        known: impl IntoIterator<Item = &'a str>,
+    ) -> Self {
+        Self::UnknownMap {
+            origin,
+            name: name.to_owned(),
+            nearest: nearest(name, known),
+        }
+    }
 }
 
 impl From<ConfigError> for crate::Error {

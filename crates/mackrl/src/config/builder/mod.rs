@@ -103,6 +103,9 @@ impl ConfigBuilder {
     ///
     /// # Errors
     /// If a value is out of its range or does not go with another.
+    ///
+    /// # Panics
+    /// Never: every value is checked when it is laid.
     pub fn build(&self) -> Result<Config, ConfigError> {
         let config = Config::deserialize(self.table.clone())
             .expect("every value was checked when it was laid");
