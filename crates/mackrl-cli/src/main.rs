@@ -1,2 +1,29 @@
-//! The `mackrl` program.
-fn main() {}
+//! The `mackrl` program: train, evaluate, certify and reproduce.
+//!
+//! This crate holds no algorithm. `args` is what was typed, `commands` what it means, `run_folder` what a run leaves on
+//! disk, `progress` what a person sees while waiting, `failure` the one place that turns errors into exit codes. Data go
+//! to stdout, everything else to stderr.
+
+mod args;
+mod commands;
+mod failure;
+mod output;
+#[cfg_attr(not(test), expect(dead_code, reason = "training is wired next"))]
+mod progress;
+#[cfg_attr(not(test), expect(dead_code, reason = "training is wired next"))]
+mod run_folder;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use crate::args::{Cli, Command};
+
+fn main() -> ExitCode {
+    let outcome = match Cli::parse().command {
+        Command::Maps(args) => commands::maps::run(&args),
+        Command::Config(args) => commands::config::run(&args),
+        Command::Bench(args) => commands::bench::run(&args),
+    };
+    failure::report(outcome)
+}

@@ -1,1 +1,35 @@
-//! The settings of a run: defaults, presets, files and overrides.
+//! The settings of a run: built-in values, presets, files and overrides.
+//!
+//! A run is described by one [`Config`], a plain value that is written into the run folder before the first step. It is put
+//! together by a [`ConfigBuilder`] from layers, each of which may leave out what it does not change:
+//!
+//! ```text
+//! built-in values  <  preset  <  file  <  --set key=value
+//! ```
+//!
+//! Each value remembers which layer it came from, so that an error can name the file, the line and the key, and a print-out
+//! can show the origin of every value. The alternative, merging the layers as text or as untyped tables and deserialising
+//! once at the end, is shorter, but its errors cannot say where a value was written.
+//!
+//! A setting is declared once, in `sections.rs`: its name, type, built-in value, accepted range and meaning. Checks, error
+//! messages, name suggestions and `mackrl config --print` all read that declaration.
+//!
+//! The number of threads is not part of a configuration, because it changes no result.
+
+mod builder;
+mod choices;
+mod document;
+mod error;
+mod presets;
+mod sections;
+mod settings;
+
+pub use builder::ConfigBuilder;
+pub use choices::{Algorithm, CommonKnowledgeFeatures, OptimiserKind, PartitionChoice};
+pub use error::{ConfigError, Origin};
+pub use presets::{Preset, presets};
+pub use sections::{
+    Config, EnvironmentConfig, ExplorationConfig, LearnerConfig, PolicyConfig, RunConfig,
+    TestConfig,
+};
+pub use settings::Setting;

@@ -1,0 +1,78 @@
+//! The flags from which a configuration is put together.
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use clap::Args;
+use mackrl::config::ConfigBuilder;
+
+#[derive(Debug, Args)]
+pub(crate) struct ConfigurationArgs {
+    /// Map to play, as `mackrl maps` lists it (short for `--set env.map=NAME`)
+    #[arg(long, value_name = "NAME", help_heading = "Configuration")]
+    pub(crate) map: Option<String>,
+
+    /// What learns: mackrl or central-v (short for `--set policy.algorithm=NAME`)
+    #[arg(long, value_name = "NAME", help_heading = "Configuration")]
+    pub(crate) algorithm: Option<String>,
+
+    /// Environment steps of training, summed over parallel environments (short for `--set run.steps_env=N`)
+    #[arg(long, value_name = "N", help_heading = "Configuration")]
+    pub(crate) steps: Option<u64>,
+
+    /// Seed from which all randomness follows (short for `--set run.seed=S`)
+    #[arg(long, value_name = "S", help_heading = "Configuration")]
+    pub(crate) seed: Option<u64>,
+
+    /// Shipped configuration to start from: default, paper or paper-code
+    #[arg(
+        long,
+        value_name = "NAME",
+        default_value = "default",
+        help_heading = "Configuration"
+    )]
+    pub(crate) preset: String,
+
+    /// TOML file laid over the preset; it needs only the lines that it changes
+    #[arg(long, value_name = "FILE", help_heading = "Configuration")]
+    pub(crate) config: Option<PathBuf>,
+
+    /// One setting laid over everything else, such as learner.gamma=0.95; repeatable
+    #[arg(long, value_name = "KEY=VALUE", help_heading = "Configuration")]
+    pub(crate) set: Vec<String>,
+}
+
+impl ConfigurationArgs {
+    /// Lays the layers over each other; `build` on the result checks ranges and gives the configuration.
+    pub(crate) fn layers(&self) -> anyhow::Result<ConfigBuilder> {
+        let mut builder = ConfigBuilder::new().preset(&self.preset)?;
+        if let Some(path) = &self.config {
+            let name = path.display().to_string();
+            let text =
+                std::fs::read_to_string(path).with_context(|| format!("cannot read {name}"))?;
+            builder = builder.file(&name, &text)?;
+        }
+        for (flag, key, value) in self.short_flags() {
+            if let Some(value) = value {
+                builder = builder.flag(&format!("{flag} {value}"), &format!("{key}={value}"))?;
+            }
+        }
+        for assignment in &self.set {
+            builder = builder.set(assignment)?;
+        }
+        Ok(builder)
+    }
+
+    fn short_flags(&self) -> [(&'static str, &'static str, Option<String>); 4] {
+        [
+            ("--map", "env.map", self.map.clone()),
+            ("--algorithm", "policy.algorithm", self.algorithm.clone()),
+            (
+                "--steps",
+                "run.steps_env",
+                self.steps.map(|n| n.to_string()),
+            ),
+            ("--seed", "run.seed", self.seed.map(|n| n.to_string())),
+        ]
+    }
+}

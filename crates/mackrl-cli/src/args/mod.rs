@@ -1,0 +1,57 @@
+//! What can be typed: the commands and their flags, as text for `--help` and as values for `commands`.
+
+mod bench;
+mod configuration;
+mod runs;
+
+use clap::{Args, Parser, Subcommand};
+
+pub(crate) use bench::{BenchArgs, BenchCommand, BenchEnvironmentArgs};
+pub(crate) use configuration::ConfigurationArgs;
+pub(crate) use runs::{CertifyArgs, EvaluateArgs, TrainArgs};
+
+/// Teaches teams to coordinate without communicating, by acting jointly on what they commonly know.
+///
+/// Multi-Agent Common Knowledge Reinforcement Learning (MACKRL), with a built-in StarCraft micromanagement simulator: no
+/// StarCraft, no Python and no GPU are needed.
+///
+/// Results go to stdout, everything else to stderr. Exit codes: 0 success, 1 a failed certificate, 2 usage, 64 a bad
+/// configuration, 65 bad data, 70 a defect of this program, 74 input or output.
+#[derive(Debug, Parser)]
+#[command(name = "mackrl", version, max_term_width = 100)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    Maps(MapsArgs),
+    Config(ConfigArgs),
+    Bench(BenchArgs),
+}
+
+/// List the maps that can be played, with the sizes of their arrays
+///
+/// Example: mackrl maps --json
+#[derive(Debug, Args)]
+pub(crate) struct MapsArgs {
+    /// Print a JSON array instead of a table
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Print the configuration that a run would have, and where each value comes from
+///
+/// Later layers win: built-in values, --preset, --config, the short flags (--map, ...), --set. The output is a complete
+/// configuration file.
+///
+/// Example: mackrl config --print --preset paper --set learner.gamma=0.95 > mine.toml
+#[derive(Debug, Args)]
+pub(crate) struct ConfigArgs {
+    /// Print every setting with its value (the default)
+    #[arg(long)]
+    pub(crate) print: bool,
+    #[command(flatten)]
+    pub(crate) configuration: ConfigurationArgs,
+}

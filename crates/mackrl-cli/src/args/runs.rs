@@ -1,0 +1,141 @@
+//! The commands that make a run or use one.
+
+use std::{num::NonZeroUsize, path::PathBuf};
+
+use clap::Args;
+
+use crate::args::ConfigurationArgs;
+
+/// Train a team, and write its weights, metrics and configuration into a run folder
+///
+/// The folder holds config.toml (everything that determines the result), metrics.jsonl (one JSON object a line),
+/// weights.safetensors (readable from PyTorch) and run.json (command, version, status). A folder that holds a run is never
+/// overwritten. The number of threads changes the speed and nothing else.
+///
+/// Example: mackrl train --map 3m --algorithm mackrl --preset paper --seed 1
+#[derive(Debug, Args)]
+pub(crate) struct TrainArgs {
+    #[command(flatten)]
+    pub(crate) configuration: ConfigurationArgs,
+
+    /// Run folder to create [default: runs/MAP-ALGORITHM-seedSEED]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+
+    #[command(flatten)]
+    pub(crate) threads: ThreadsArgs,
+
+    /// Print a JSON summary at the end instead of a sentence
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Play greedy episodes with a trained team and report how it does
+///
+/// Prints the mean and the standard error of battles won, return and episode length.
+///
+/// Example: mackrl evaluate runs/3m-mackrl-seed1 --episodes 320 --json
+#[derive(Debug, Args)]
+pub(crate) struct EvaluateArgs {
+    /// Run folder that `mackrl train` wrote
+    #[arg(value_name = "DIR")]
+    pub(crate) run: PathBuf,
+
+    /// Episodes to play
+    #[arg(long, value_name = "N", default_value = "320")]
+    pub(crate) episodes: NonZeroUsize,
+
+    /// Seed of the episodes [default: the run's own]
+    #[arg(long, value_name = "S")]
+    pub(crate) seed: Option<u64>,
+
+    #[command(flatten)]
+    pub(crate) threads: ThreadsArgs,
+
+    /// Print a JSON object instead of a table
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Prove that a trained team runs decentralised
+///
+/// Starts one process per agent, gives each only its own local views, its number, the weights and the seed, and compares
+/// every action with the central run, sampled and greedy, for whole episodes. Exit code 1 and the first counter-example
+/// if one action differs.
+///
+/// Example: mackrl certify runs/3m-mackrl-seed1 --episodes 100 --json
+#[derive(Debug, Args)]
+pub(crate) struct CertifyArgs {
+    /// Run folder that `mackrl train` wrote
+    #[arg(value_name = "DIR")]
+    pub(crate) run: PathBuf,
+
+    /// Episodes to compare
+    #[arg(long, value_name = "N", default_value = "100")]
+    pub(crate) episodes: NonZeroUsize,
+
+    /// Print a JSON object instead of a table
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ThreadsArgs {
+    /// Threads to use; changes no result [default: all cores]
+    #[arg(long, value_name = "K")]
+    threads: Option<NonZeroUsize>,
+}
+
+impl ThreadsArgs {
+    /// The number asked for, or one for each core.
+    pub(crate) fn count(&self) -> usize {
+        self.threads
+            .or_else(|| std::thread::available_parallelism().ok())
+            .map_or(1, NonZeroUsize::get)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::{FromArgMatches, Parser};
+
+    use super::*;
+
+    #[derive(Debug, Parser)]
+    struct Typed<T: Args + FromArgMatches> {
+        #[command(flatten)]
+        args: T,
+    }
+
+    fn typed<T: Args>(line: &str) -> T {
+        Typed::<T>::try_parse_from(line.split_whitespace())
+            .unwrap()
+            .args
+    }
+
+    #[test]
+    fn flags_of_training_reach_the_configuration() {
+        let args: TrainArgs = typed(
+            "train --map 2s3z --algorithm central-v --preset paper --steps 9 --seed 4 --threads 3 --out x --set learner.gamma=0.5",
+        );
+        let config = args.configuration.layers().unwrap().build().unwrap();
+        assert_eq!(config.env.map, "2s3z");
+        assert_eq!(config.policy.algorithm, mackrl::config::Algorithm::CentralV);
+        assert_eq!((config.run.steps_env, config.run.seed), (9, 4));
+        assert_eq!(config.learner.gamma, 0.5);
+        assert_eq!(args.threads.count(), 3);
+        assert_eq!(args.out, Some(PathBuf::from("x")));
+    }
+
+    #[test]
+    fn evaluation_and_certificate_have_the_usual_lengths() {
+        assert_eq!(typed::<EvaluateArgs>("evaluate x").episodes.get(), 320);
+        assert_eq!(typed::<CertifyArgs>("certify x").episodes.get(), 100);
+    }
+
+    #[test]
+    fn no_episodes_are_a_usage_error() {
+        let line = ["evaluate", "x", "--episodes", "0"];
+        assert!(Typed::<EvaluateArgs>::try_parse_from(line).is_err());
+    }
+}

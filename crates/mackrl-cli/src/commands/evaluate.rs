@@ -1,0 +1,84 @@
+//! `mackrl evaluate`: how well a trained team plays.
+
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::{args::EvaluateArgs, output, run_folder::Run};
+
+/// What is to be played.
+#[derive(Debug)]
+pub(crate) struct Order {
+    /// The trained team.
+    pub(crate) run: Run,
+    /// Episodes to play, at least 1.
+    pub(crate) episodes: usize,
+    /// Seed of the episodes.
+    pub(crate) seed: u64,
+    /// Threads to use.
+    pub(crate) threads: usize,
+}
+
+/// Prints what `play` makes of the trained team.
+pub(crate) fn run<E: Serialize>(
+    args: &EvaluateArgs,
+    play: impl FnOnce(&Order) -> Result<E, mackrl::Error>,
+) -> anyhow::Result<()> {
+    let run = Run::open(&args.run)?;
+    let order = Order {
+        episodes: args.episodes.get(),
+        seed: args.seed.unwrap_or(run.config.run.seed),
+        threads: args.threads.count(),
+        run,
+    };
+    print(&play(&order)?, args.json)
+}
+
+/// Prints an evaluation: a JSON object of numbers, or a table in which each mean stands beside its standard error.
+fn print(evaluation: &impl Serialize, json: bool) -> anyhow::Result<()> {
+    if json {
+        output::print_json(evaluation)
+    } else {
+        output::print(&table(&serde_json::to_value(evaluation)?))
+    }
+}
+
+/// One line for each number; `NAME_sem` joins the line of `NAME_mean`.
+fn table(evaluation: &Value) -> String {
+    let numbers = evaluation.as_object().into_iter().flatten();
+    let rows: Vec<Vec<String>> = numbers
+        .filter(|(name, _)| !name.ends_with("_sem"))
+        .map(|(name, value)| {
+            let error = name
+                .strip_suffix("_mean")
+                .and_then(|stem| evaluation.get(format!("{stem}_sem")))
+                .map_or_else(String::new, |error| format!("± {}", number(error)));
+            vec![name.clone(), number(value), error]
+        })
+        .collect();
+    output::table(&rows)
+}
+
+fn number(value: &Value) -> String {
+    match value.as_f64() {
+        Some(float) if value.is_f64() => format!("{float:.4}"),
+        _ => value.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mean_stands_beside_its_standard_error() {
+        let evaluation = serde_json::json!({
+            "episodes": 320,
+            "test_battle_won_mean": 0.9375,
+            "test_battle_won_sem": 0.013_64,
+        });
+        insta::assert_snapshot!(table(&evaluation), @r"
+        episodes                 320
+        test_battle_won_mean  0.9375  ± 0.0136
+        ");
+    }
+}

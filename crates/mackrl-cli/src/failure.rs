@@ -1,0 +1,189 @@
+//! From errors to exit codes and words: the one place that knows both.
+
+use std::{
+    fmt,
+    io::{self, Write},
+    path::PathBuf,
+    process::ExitCode,
+};
+
+use mackrl::config::ConfigError;
+
+/// What can go wrong in this program beyond what its libraries say.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// A folder in which nothing may be overwritten.
+    FolderInUse {
+        folder: PathBuf,
+        /// What lies there, for "holds ...".
+        holds: String,
+    },
+    /// A folder in which no run lies.
+    NotARun { folder: PathBuf },
+    /// Stored data that cannot be used.
+    BadData { message: String },
+    /// A team that does not run decentralised.
+    CertificateFailed { mismatches: u64 },
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::FolderInUse { folder, holds } => write!(
+                formatter,
+                "{} already holds {holds}, and is not overwritten",
+                folder.display()
+            ),
+            Self::NotARun { folder } => write!(
+                formatter,
+                "{} is not a run folder: it has no config.toml",
+                folder.display()
+            ),
+            Self::BadData { message } => formatter.write_str(message),
+            Self::CertificateFailed { mismatches } => write!(
+                formatter,
+                "not decentralised: {mismatches} actions differ from the central run"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for Failure {}
+
+/// Why the program ends, by the number that the shell sees.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Exit {
+    CertificateFailed = 1,
+    Usage = 2,
+    Configuration = 64,
+    Data = 65,
+    Defect = 70,
+    InputOutput = 74,
+}
+
+/// Tells what went wrong, if something did, and gives the exit code.
+pub(crate) fn report(outcome: anyhow::Result<()>) -> ExitCode {
+    let Err(error) = outcome else {
+        return ExitCode::SUCCESS;
+    };
+    if reader_has_gone(&error) {
+        return ExitCode::SUCCESS;
+    }
+    // Nothing is left to do if stderr cannot be written either.
+    let _ = io::stderr().write_all(explain(&error).as_bytes());
+    ExitCode::from(exit(&error) as u8)
+}
+
+/// The chain of causes on one line, and the remedy on another if one is known.
+fn explain(error: &anyhow::Error) -> String {
+    let mut text = format!("error: {error:#}\n");
+    if let Some(hint) = hint(error) {
+        text.push_str(&format!("hint: {hint}\n"));
+    }
+    text
+}
+
+fn exit(error: &anyhow::Error) -> Exit {
+    error.chain().find_map(exit_of).unwrap_or(Exit::Defect)
+}
+
+fn exit_of(cause: &(dyn std::error::Error + 'static)) -> Option<Exit> {
+    if let Some(failure) = cause.downcast_ref::<Failure>() {
+        return Some(match failure {
+            Failure::FolderInUse { .. } | Failure::NotARun { .. } => Exit::Usage,
+            Failure::BadData { .. } => Exit::Data,
+            Failure::CertificateFailed { .. } => Exit::CertificateFailed,
+        });
+    }
+    if let Some(error) = cause.downcast_ref::<mackrl::Error>() {
+        return Some(match error {
+            mackrl::Error::Config(_) => Exit::Configuration,
+            mackrl::Error::Data(_) | mackrl::Error::NotFinite { .. } => Exit::Data,
+            _ => Exit::Defect,
+        });
+    }
+    if cause.is::<ConfigError>() {
+        return Some(Exit::Configuration);
+    }
+    cause.is::<io::Error>().then_some(Exit::InputOutput)
+}
+
+fn hint(error: &anyhow::Error) -> Option<String> {
+    error.chain().find_map(hint_of)
+}
+
+fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
+    if let Some(failure) = cause.downcast_ref::<Failure>() {
+        return match failure {
+            Failure::FolderInUse { .. } => {
+                Some("choose another folder with --out, or move this one away".to_owned())
+            }
+            Failure::NotARun { .. } => Some(
+                "give the folder that `mackrl train` wrote, such as runs/3m-mackrl-seed1"
+                    .to_owned(),
+            ),
+            _ => None,
+        };
+    }
+    match cause.downcast_ref::<ConfigError>()? {
+        ConfigError::UnknownMap { .. } => Some("`mackrl maps` lists every map".to_owned()),
+        ConfigError::UnknownKey { .. } => {
+            Some("`mackrl config --print` lists every setting".to_owned())
+        }
+        ConfigError::Syntax { .. } => {
+            Some("settings are written as TOML, such as learner.gamma = 0.95".to_owned())
+        }
+        _ => None,
+    }
+}
+
+/// Whether stdout was closed by a reader that has read enough, such as `head`.
+fn reader_has_gone(error: &anyhow::Error) -> bool {
+    error.chain().any(|cause| {
+        cause
+            .downcast_ref::<io::Error>()
+            .is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use anyhow::Context;
+    use mackrl::config::ConfigBuilder;
+
+    use super::*;
+
+    #[test]
+    fn every_kind_of_error_has_its_exit_code() {
+        let config = ConfigBuilder::new().set("a=1").unwrap_err();
+        let missing = io::Error::from(io::ErrorKind::NotFound);
+        let folder = PathBuf::from("x");
+        let cases: [(anyhow::Error, Exit); 7] = [
+            (config.clone().into(), Exit::Configuration),
+            (mackrl::Error::from(config).into(), Exit::Configuration),
+            (mackrl::Error::Data(String::new()).into(), Exit::Data),
+            (missing.into(), Exit::InputOutput),
+            (Failure::NotARun { folder }.into(), Exit::Usage),
+            (
+                Failure::CertificateFailed { mismatches: 1 }.into(),
+                Exit::CertificateFailed,
+            ),
+            (anyhow::anyhow!("?"), Exit::Defect),
+        ];
+        for (error, expected) in cases {
+            assert_eq!(exit(&error.context("while testing")), expected);
+        }
+    }
+
+    #[test]
+    fn the_chain_of_causes_is_told_once_with_the_remedy() {
+        let error = Err::<(), _>(ConfigBuilder::new().set("gama=1").unwrap_err())
+            .context("cannot configure")
+            .unwrap_err();
+        assert_eq!(
+            explain(&error),
+            "error: cannot configure: --set gama=1: unknown key `gama`, did you mean `learner.gamma`?\n\
+             hint: `mackrl config --print` lists every setting\n"
+        );
+    }
+}

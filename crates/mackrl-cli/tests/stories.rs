@@ -1,0 +1,146 @@
+//! What a person types, and what they get.
+
+use assert_cmd::Command;
+
+/// A command line that was run, with what came back.
+struct Story {
+    typed: String,
+    code: Option<i32>,
+    stdout: String,
+    stderr: String,
+}
+
+/// Types `line`, of which words are separated by spaces, in an empty folder.
+fn type_in(line: &str) -> Story {
+    let folder = tempfile::tempdir().expect("a folder for the story");
+    type_in_folder(line, folder.path())
+}
+
+fn type_in_folder(line: &str, folder: &std::path::Path) -> Story {
+    let output = Command::cargo_bin("mackrl")
+        .expect("the program is built")
+        .args(line.split_whitespace())
+        .current_dir(folder)
+        .env_remove("COLUMNS")
+        .output()
+        .expect("the program starts");
+    let text = |bytes| String::from_utf8(bytes).expect("output is UTF-8");
+    Story {
+        typed: line.to_owned(),
+        code: output.status.code(),
+        stdout: text(output.stdout),
+        stderr: text(output.stderr),
+    }
+}
+
+impl Story {
+    /// It went well; gives what stdout holds.
+    fn succeeds(self) -> String {
+        assert_eq!(self.code, Some(0), "`{}`: {}", self.typed, self.stderr);
+        self.stdout
+    }
+
+    /// It failed with this exit code and nothing on stdout; gives what stderr holds.
+    fn fails(self, code: i32) -> String {
+        assert_eq!(self.code, Some(code), "`{}`: {}", self.typed, self.stderr);
+        assert_eq!(self.stdout, "", "`{}`", self.typed);
+        self.stderr
+    }
+}
+
+#[test]
+fn help_teaches_every_command() {
+    let mut help = type_in("--help").succeeds();
+    for command in ["maps", "config", "bench env"] {
+        help += &format!("\n$ mackrl {command} --help\n");
+        help += &type_in(&format!("{command} --help")).succeeds();
+    }
+    insta::assert_snapshot!("help", help);
+}
+
+#[test]
+fn an_unknown_flag_is_a_usage_error() {
+    insta::assert_snapshot!(type_in("maps --jsom").fails(2), @r"
+    error: unexpected argument '--jsom' found
+
+      tip: a similar argument exists: '--json'
+
+    Usage: mackrl maps --json
+
+    For more information, try '--help'.
+    ");
+}
+
+#[test]
+fn an_unknown_setting_names_its_neighbour() {
+    insta::assert_snapshot!(type_in("config --set learner.gama=0.9").fails(64), @r"
+    error: --set learner.gama=0.9: unknown key `learner.gama`, did you mean `learner.gamma`?
+    hint: `mackrl config --print` lists every setting
+    ");
+}
+
+#[test]
+fn a_value_out_of_range_says_what_is_expected() {
+    insta::assert_snapshot!(type_in("config --set learner.gamma=2").fails(64), @"error: --set learner.gamma=2: `learner.gamma` is 2.0, expected a number in [0, 1]");
+    insta::assert_snapshot!(type_in("config --algorithm qmix").fails(64), @r#"error: --algorithm qmix: `policy.algorithm` is "qmix", expected `mackrl` or `central-v`"#);
+}
+
+#[test]
+fn an_unknown_preset_names_its_neighbour() {
+    insta::assert_snapshot!(type_in("config --preset papre").fails(64), @"error: unknown preset `papre`, expected default, paper, paper-code, did you mean `paper`?");
+}
+
+#[test]
+fn an_error_in_a_file_names_file_line_and_column() {
+    let folder = tempfile::tempdir().expect("a folder for the story");
+    let text = "[learner]\ngamma = 0.9\nlearning_rate = \"fast\"\n";
+    std::fs::write(folder.path().join("mine.toml"), text).expect("the folder can be written");
+    let story = type_in_folder("config --config mine.toml", folder.path());
+    insta::assert_snapshot!(story.fails(64), @r#"error: mine.toml:3:17: `learner.learning_rate` is "fast", expected a number in (0, 1]"#);
+}
+
+#[test]
+fn a_file_that_is_not_there_is_an_input_error() {
+    insta::assert_snapshot!(type_in("config --config none.toml").fails(74), @"error: cannot read none.toml: No such file or directory (os error 2)");
+}
+
+#[test]
+fn the_printed_configuration_can_be_read_back() {
+    let folder = tempfile::tempdir().expect("a folder for the story");
+    let printed = type_in("config --print --preset paper-code --seed 7").succeeds();
+    std::fs::write(folder.path().join("mine.toml"), &printed).expect("the folder can be written");
+    let again = type_in_folder("config --config mine.toml", folder.path()).succeeds();
+    let values = |text: &str| -> Vec<String> {
+        text.lines()
+            .map(|line| {
+                line.split('#')
+                    .next()
+                    .unwrap_or_default()
+                    .trim_end()
+                    .to_owned()
+            })
+            .collect()
+    };
+    assert_eq!(values(&printed), values(&again));
+    assert!(again.contains("seed = 7"), "{again}");
+}
+
+#[test]
+fn an_unknown_map_points_to_the_list() {
+    insta::assert_snapshot!(type_in("bench env --map nowhere").fails(64), @r"
+    error: --map nowhere: unknown map `nowhere`
+    hint: `mackrl maps` lists every map
+    ");
+}
+
+#[test]
+fn maps_are_listed_as_a_table_and_as_json() {
+    let table = type_in("maps").succeeds();
+    let json: Vec<serde_json::Value> =
+        serde_json::from_str(&type_in("maps --json").succeeds()).expect("a JSON array");
+    assert_eq!(table.lines().count(), json.len() + 1);
+    for map in json {
+        let name = map["name"].as_str().expect("a map has a name");
+        assert!(table.contains(name), "{name} is missing in the table");
+    }
+}

@@ -1,0 +1,193 @@
+use proptest::prelude::*;
+
+use super::*;
+use crate::config::{Algorithm, CommonKnowledgeFeatures, OptimiserKind, PartitionChoice};
+
+fn file(text: &str) -> Result<ConfigBuilder, ConfigError> {
+    ConfigBuilder::new().file("run.toml", text)
+}
+
+fn message(result: Result<impl std::fmt::Debug, ConfigError>) -> String {
+    result.unwrap_err().to_string()
+}
+
+#[test]
+fn later_layers_win_over_earlier_ones() {
+    let builder = ConfigBuilder::new()
+        .preset("paper-code")
+        .unwrap()
+        .file(
+            "run.toml",
+            "[learner]\noptimiser = \"adam\"\nlambda = 0.7\n",
+        )
+        .unwrap()
+        .set("learner.lambda=0.6")
+        .unwrap();
+    let config = builder.build().unwrap();
+    assert_eq!(
+        config.policy.common_knowledge,
+        CommonKnowledgeFeatures::Thin
+    );
+    assert_eq!(config.learner.optimiser, OptimiserKind::Adam);
+    assert_eq!(config.learner.lambda, 0.6);
+    assert_eq!(
+        builder.origin("learner.optimiser").to_string(),
+        "run.toml:2:13"
+    );
+    assert_eq!(
+        builder.origin("learner.lambda").to_string(),
+        "--set learner.lambda=0.6"
+    );
+}
+
+#[test]
+fn an_unknown_key_is_named_with_its_place_and_its_neighbour() {
+    assert_eq!(
+        message(file("[learner]\ngamma = 0.9\ngama = 0.9\n")),
+        "run.toml:3:1: unknown key `learner.gama`, did you mean `learner.gamma`?"
+    );
+    assert_eq!(
+        message(ConfigBuilder::new().set("gamma=0.9")),
+        "--set gamma=0.9: unknown key `gamma`, did you mean `learner.gamma`?"
+    );
+    assert_eq!(
+        message(file("colour = 3")),
+        "run.toml:1:1: unknown key `colour`"
+    );
+    assert_eq!(
+        message(file("[learner.gamma]\nstart = 0.9")),
+        "run.toml:2:1: unknown key `learner.gamma.start`, did you mean `exploration.start`?"
+    );
+}
+
+#[test]
+fn a_wrong_type_is_named_with_its_place_and_what_was_expected() {
+    assert_eq!(
+        message(file("[learner]\ngamma = \"high\"\n")),
+        "run.toml:2:9: `learner.gamma` is \"high\", expected a number in [0, 1]"
+    );
+    assert_eq!(
+        message(file("learner = 3\n")),
+        "run.toml:1:11: `learner` is 3, expected a table of settings"
+    );
+    assert_eq!(
+        message(file("[policy]\nalgorithm = \"qmix\"\n")),
+        "run.toml:2:13: `policy.algorithm` is \"qmix\", expected `mackrl` or `central-v`"
+    );
+    assert_eq!(
+        message(ConfigBuilder::new().set("run.seed=-1")),
+        "--set run.seed=-1: `run.seed` is -1, expected an integer in [0, 2^53]"
+    );
+}
+
+#[test]
+fn a_value_out_of_range_is_named_with_its_place() {
+    let built = |text: &str| file(text).unwrap().build();
+    assert_eq!(
+        message(built("[learner]\ngamma = 1.5\n")),
+        "run.toml:2:9: `learner.gamma` is 1.5, expected a number in [0, 1]"
+    );
+    assert_eq!(
+        message(built("learner.learning_rate = nan")),
+        "run.toml:1:25: `learner.learning_rate` is nan, expected a number in (0, 1]"
+    );
+    assert_eq!(
+        message(built("exploration.finish = 0.9")),
+        "run.toml:1:22: `exploration.finish` is 0.9, expected a number in [0, exploration.start]"
+    );
+}
+
+#[test]
+fn a_file_that_is_not_toml_is_named_with_line_and_column() {
+    assert!(message(file("[learner]\ngamma 0.9\n")).starts_with("run.toml:2:7: "));
+    assert_eq!(
+        message(ConfigBuilder::new().set("learner.gamma")),
+        "--set learner.gamma: expected key=value"
+    );
+}
+
+#[test]
+fn a_short_flag_is_named_as_it_was_typed() {
+    assert_eq!(
+        message(
+            ConfigBuilder::new()
+                .flag("--steps 0", "run.steps_env=0")
+                .unwrap()
+                .build()
+        ),
+        "--steps 0: `run.steps_env` is 0, expected an integer in [1, 2^53]"
+    );
+}
+
+#[test]
+fn a_preset_that_is_not_shipped_names_its_neighbour() {
+    assert_eq!(
+        message(ConfigBuilder::new().preset("papers")),
+        "unknown preset `papers`, expected default, paper, paper-code, did you mean `paper`?"
+    );
+}
+
+#[test]
+fn settings_of_the_map_reach_it() {
+    let config = ConfigBuilder::new()
+        .set("env.move_amount=5")
+        .unwrap()
+        .build()
+        .unwrap();
+    assert_eq!(config.env.settings["move_amount"], toml::Value::Integer(5));
+}
+
+fn choice() -> impl Strategy<Value = PartitionChoice> {
+    prop_oneof![
+        Just(PartitionChoice::All),
+        Just(PartitionChoice::RoundRobin),
+        (1usize..99).prop_map(PartitionChoice::Sampled),
+    ]
+}
+
+prop_compose! {
+    fn any_config()(
+        (gamma, lambda, rate, critic_rate) in (0.0..=1.0f64, 0.0..=1.0f64, 1e-9..=1.0f64, 1e-9..=1.0f64),
+        (start, share) in (0.0..=1.0f64, 0.0..=1.0f64),
+        (steps_env, seed) in (1u64..=1 << 53, 0u64..=1 << 53),
+        (partitions, thin, central_v, rmsprop) in (choice(), any::<bool>(), any::<bool>(), any::<bool>()),
+        map in "[a-z0-9_\"\\\\]{1,8}",
+        move_amount in 0i64..9,
+    ) -> Config {
+        let mut config = Config::default();
+        config.learner.gamma = gamma;
+        config.learner.lambda = lambda;
+        config.learner.learning_rate = rate;
+        config.learner.critic_learning_rate = critic_rate;
+        config.exploration.start = start;
+        config.exploration.finish = start * share;
+        config.run.steps_env = steps_env;
+        config.run.seed = seed;
+        config.policy.partitions = partitions;
+        if thin { config.policy.common_knowledge = CommonKnowledgeFeatures::Thin; }
+        if central_v { config.policy.algorithm = Algorithm::CentralV; }
+        if rmsprop { config.learner.optimiser = OptimiserKind::Rmsprop; }
+        config.env.map = map;
+        config.env.settings.insert("move_amount".to_owned(), move_amount.into());
+        config
+    }
+}
+
+proptest! {
+    #[test]
+    fn a_configuration_is_read_as_it_was_written(config in any_config()) {
+        prop_assert_eq!(config.validate(), Ok(()));
+        let read = file(&config.to_toml()).unwrap().build().unwrap();
+        prop_assert_eq!(read, config);
+    }
+
+    #[test]
+    fn no_text_makes_reading_panic(text in "[a-z=.\\[\\]0-9\" \n]{0,60}") {
+        if let Ok(builder) = file(&text) {
+            let _ = builder.build();
+        }
+        if let Ok(builder) = ConfigBuilder::new().set(&text) {
+            let _ = builder.build();
+        }
+    }
+}
