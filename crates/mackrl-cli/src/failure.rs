@@ -7,7 +7,7 @@ use std::{
     process::ExitCode,
 };
 
-use mackrl::config::ConfigError;
+use mackrl::config::{Config, ConfigError};
 
 /// What can go wrong in this program beyond what its libraries say.
 #[derive(Debug)]
@@ -129,6 +129,11 @@ fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
         ConfigError::UnknownMap { .. } => Some("`mackrl maps` lists every map".to_owned()),
         ConfigError::UnknownKey { .. } => {
             Some("`mackrl config --print` lists every setting".to_owned())
+        }
+        ConfigError::WrongValue { key, .. } => {
+            let settings = Config::settings();
+            let setting = settings.iter().find(|setting| setting.key == key)?;
+            Some(format!("{key}: {}", setting.meaning()))
         }
         ConfigError::Syntax { .. } => {
             Some("settings are written as TOML, such as learner.gamma = 0.95".to_owned())

@@ -81,8 +81,14 @@ fn an_unknown_setting_names_its_neighbour() {
 
 #[test]
 fn a_value_out_of_range_says_what_is_expected() {
-    insta::assert_snapshot!(type_in("config --set learner.gamma=2").fails(64), @"error: --set learner.gamma=2: `learner.gamma` is 2.0, expected a number in [0, 1]");
-    insta::assert_snapshot!(type_in("config --algorithm qmix").fails(64), @r#"error: --algorithm qmix: `policy.algorithm` is "qmix", expected `mackrl` or `central-v`"#);
+    insta::assert_snapshot!(type_in("config --set learner.gamma=2").fails(64), @r"
+    error: --set learner.gamma=2: `learner.gamma` is 2.0, expected a number in [0, 1]
+    hint: learner.gamma: Discount γ of one environment step.
+    ");
+    insta::assert_snapshot!(type_in("config --algorithm qmix").fails(64), @r#"
+    error: --algorithm qmix: `policy.algorithm` is "qmix", expected `mackrl` or `central-v`
+    hint: policy.algorithm: What learns: the hierarchy, or the agent controllers alone.
+    "#);
 }
 
 #[test]
@@ -96,7 +102,10 @@ fn an_error_in_a_file_names_file_line_and_column() {
     let text = "[learner]\ngamma = 0.9\nlearning_rate = \"fast\"\n";
     std::fs::write(folder.path().join("mine.toml"), text).expect("the folder can be written");
     let story = type_in_folder("config --config mine.toml", folder.path());
-    insta::assert_snapshot!(story.fails(64), @r#"error: mine.toml:3:17: `learner.learning_rate` is "fast", expected a number in (0, 1]"#);
+    insta::assert_snapshot!(story.fails(64), @r#"
+    error: mine.toml:3:17: `learner.learning_rate` is "fast", expected a number in (0, 1]
+    hint: learner.learning_rate: Step size of the controllers.
+    "#);
 }
 
 #[test]

@@ -120,7 +120,7 @@ fn split(word: u64) -> [u32; 2] {
 }
 
 fn low_word(value: usize) -> u32 {
-    (value & 0xFFFF_FFFF) as u32
+    split(value as u64)[0]
 }
 
 /// Philox4x32-10.

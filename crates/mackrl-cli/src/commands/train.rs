@@ -81,12 +81,15 @@ fn train_into(
     progress: &mut Progress,
 ) -> anyhow::Result<Summary> {
     let outcome = train(folder, training, progress);
-    let status = match &outcome {
+    progress.finish();
+    let recorded = folder.set_status(match &outcome {
         Ok(_) => Status::Finished,
         Err(_) => Status::Failed,
-    };
-    folder.set_status(status)?;
-    outcome
+    });
+    // What stopped the training matters more than a status that cannot be written.
+    let summary = outcome?;
+    recorded?;
+    Ok(summary)
 }
 
 fn train(
@@ -102,7 +105,6 @@ fn train(
         progress.show(&standing);
         steps_env = standing.steps_env;
     }
-    progress.finish();
     folder.write_weights(&training.weights())?;
     let wall_s = start.elapsed().as_secs_f64();
     Ok(Summary {
