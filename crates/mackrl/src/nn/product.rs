@@ -190,9 +190,13 @@ impl<E: Element> Product<'_, E> {
         for (i, a) in a.iter_mut().enumerate() {
             *a = &self.a.values[(row + i) * self.a.stride..][..inner];
         }
-        for (k, b) in panel.chunks_exact(per_row).enumerate() {
-            multiply_add(lanes, &a, k, &b[first..], &mut sums);
-        }
+        let sums = {
+            let mut held = sums;
+            for (k, b) in panel.chunks_exact(per_row).enumerate() {
+                multiply_add(lanes, &a, k, &b[first..], &mut held);
+            }
+            held
+        };
         for (i, sum) in sums.iter().enumerate() {
             let place = (row + i) * self.c_stride + column;
             store_row(lanes, &mut self.c[place..][..length], sum);
@@ -321,17 +325,19 @@ impl<E: Element> WeightGradient<'_, E> {
             let place = (first + i) * self.gradient_stride + to;
             load_row(lanes, &self.gradient[place..][..length], sum);
         }
+        let mut held = sums;
         let a = self.a.values.chunks(self.a.stride);
         for (a, d) in a.zip(d.values.chunks(d.stride)).take(self.rows) {
             let a = &a[first..][..ROWS];
             let d = L::vectors(&d[from..][..VECTORS * L::LANES]);
-            for (sum, &a) in sums.iter_mut().zip(a) {
+            for (sum, &a) in held.iter_mut().zip(a) {
                 let a = lanes.splat(a);
                 for (sum, &d) in sum.iter_mut().zip(d) {
                     *sum = lanes.mul_add(a, d, *sum);
                 }
             }
         }
+        let sums = held;
         for (i, sum) in sums.iter().enumerate() {
             let place = (first + i) * self.gradient_stride + to;
             store_row(lanes, &mut self.gradient[place..][..length], sum);
@@ -405,14 +411,17 @@ fn multiply_add<L: Lanes, const ROWS: usize, const VECTORS: usize>(
 }
 
 /// Loads vectors from a slice that may be shorter than they are.
+///
+/// Here and in [`store_row`] the loop has a constant length, or else the compiler keeps the sums in memory.
 #[inline(always)]
 fn load_row<L: Lanes, const VECTORS: usize>(
     lanes: L,
     slice: &[L::Element],
     vectors: &mut [L::Vector; VECTORS],
 ) {
-    for (vector, part) in vectors.iter_mut().zip(slice.chunks(L::LANES)) {
-        *vector = lanes.load(part);
+    for (v, vector) in vectors.iter_mut().enumerate() {
+        let [from, to] = [v, v + 1].map(|v| slice.len().min(v * L::LANES));
+        *vector = lanes.load(&slice[from..to]);
     }
 }
 
@@ -423,7 +432,8 @@ fn store_row<L: Lanes, const VECTORS: usize>(
     slice: &mut [L::Element],
     vectors: &[L::Vector; VECTORS],
 ) {
-    for (&vector, part) in vectors.iter().zip(slice.chunks_mut(L::LANES)) {
-        lanes.store(part, vector);
+    for (v, &vector) in vectors.iter().enumerate() {
+        let [from, to] = [v, v + 1].map(|v| slice.len().min(v * L::LANES));
+        lanes.store(&mut slice[from..to], vector);
     }
 }
