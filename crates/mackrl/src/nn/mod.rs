@@ -27,6 +27,8 @@ mod parameters;
 mod product;
 mod recurrent;
 mod softmax;
+#[cfg(test)]
+mod tests;
 mod trace;
 
 pub use feed_forward::{FeedForward, FeedForwardTrace, FeedForwardWeights};

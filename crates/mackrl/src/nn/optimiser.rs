@@ -240,3 +240,44 @@ impl<E: Element> Kernel<E> for RmsProp<'_, E> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clipping_shortens_long_gradients_only() {
+        let mut gradient = [3.0_f64, 0.0, -4.0];
+        assert_eq!(clip_gradient_norm(&mut gradient, 10.0), 5.0, "norm");
+        assert_eq!(gradient, [3.0, 0.0, -4.0], "a short gradient");
+        assert_eq!(clip_gradient_norm(&mut gradient, 1.0), 5.0, "norm");
+        let norm = clip_gradient_norm(&mut gradient, 1.0);
+        assert!((norm - 1.0).abs() < 1e-6, "norm after clipping: {norm}");
+    }
+
+    #[test]
+    fn the_first_broken_number_is_found() {
+        let mut numbers = vec![1.0_f32; 1009];
+        assert_eq!(first_not_finite(&numbers), None, "all finite");
+        numbers[701] = f32::NAN;
+        numbers[809] = f32::INFINITY;
+        assert_eq!(first_not_finite(&numbers), Some(701), "first of two");
+        numbers[13] = f32::NEG_INFINITY;
+        assert_eq!(first_not_finite(&numbers), Some(13), "first of three");
+    }
+
+    #[test]
+    fn an_optimiser_continues_from_its_moments() {
+        for kind in [OptimiserKind::ADAM, OptimiserKind::RMSPROP] {
+            let mut whole = Optimiser::<f32>::new(kind, 3);
+            let mut parameters = [0.1, 0.2, 0.3];
+            whole.step(0.01, &[1.0, -2.0, 3.0], &mut parameters);
+            let mut resumed = Optimiser::new(kind, 3);
+            resumed.restore(whole.moments().clone());
+            let mut continued = parameters;
+            whole.step(0.01, &[0.5, 0.5, -0.5], &mut parameters);
+            resumed.step(0.01, &[0.5, 0.5, -0.5], &mut continued);
+            assert_eq!(parameters, continued, "{kind:?}");
+        }
+    }
+}

@@ -116,13 +116,15 @@ impl<E: Element> Product<'_, E> {
             let width = self.b.width_at(column);
             let panel = &self.b.values.as_slice()[column * self.b.inner..][..width * self.b.inner];
             let per_row = width / L::LANES;
+            // Vectors that hold padding alone are left out.
+            let used = width.min(self.b.columns - column).div_ceil(L::LANES);
             let mut first = 0;
-            while first < per_row {
+            while first < used {
                 let at = column + first * L::LANES;
-                if per_row - first >= VECTORS {
+                if used - first >= VECTORS {
                     self.strip::<L, VECTORS>(lanes, panel, per_row, first, at);
                     first += VECTORS;
-                } else if per_row - first >= 2 {
+                } else if used - first >= 2 {
                     self.strip::<L, 2>(lanes, panel, per_row, first, at);
                     first += 2;
                 } else {
