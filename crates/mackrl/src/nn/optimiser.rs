@@ -1,4 +1,4 @@
-//! Adam and RMSprop with PyTorch's semantics, and what surrounds an update: clipping and the search for broken numbers.
+//! Adam and `RMSprop` with PyTorch's semantics, and what surrounds an update: clipping and the search for broken numbers.
 
 use crate::{
     Real,
@@ -33,7 +33,7 @@ impl OptimiserKind {
         beta2: 0.999,
         epsilon: 1e-8,
     };
-    /// RMSprop with PyTorch's usual constants: 0.99, 1e-8.
+    /// `RMSprop` with PyTorch's usual constants: 0.99, 1e-8.
     pub const RMSPROP: Self = Self::RmsProp {
         smoothing: 0.99,
         epsilon: 1e-8,
@@ -45,7 +45,7 @@ impl OptimiserKind {
 pub struct Moments<R> {
     /// Steps taken.
     pub steps: u64,
-    /// Averages of gradients; empty for RMSprop.
+    /// Averages of gradients; empty for `RMSprop`.
     pub first: Vec<R>,
     /// Averages of squared gradients.
     pub second: Vec<R>,

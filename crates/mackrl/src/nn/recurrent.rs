@@ -1,4 +1,4 @@
-//! The recurrent network of every controller: Linear + ReLU, a gated recurrent unit, Linear.
+//! The recurrent network of every controller: Linear + `ReLU`, a gated recurrent unit, Linear.
 
 use std::ops::Range;
 
@@ -7,7 +7,8 @@ use mackrl_env::EpisodeKey;
 use crate::{
     Real,
     nn::{
-        gru::{GATES, Gru, GruWeights},
+        gates::GATES,
+        gru::{Gru, GruWeights},
         lanes::{Element, Kernel, Lanes},
         linear::{Linear, LinearWeights},
         parameters::ParameterLayout,
@@ -30,7 +31,7 @@ pub struct NetworkSizes {
     pub outputs: usize,
 }
 
-/// Linear + ReLU, a gated recurrent unit, Linear; as places in a flat parameter vector.
+/// Linear + `ReLU`, a gated recurrent unit, Linear; as places in a flat parameter vector.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RecurrentNetwork {
     input: Linear,

@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use crate::{
     Real,
-    nn::{aligned::Aligned, gru::GATES, recurrent::NetworkSizes},
+    nn::{aligned::Aligned, gates::GATES, recurrent::NetworkSizes},
 };
 
 /// How much of an episode a [`Trace`] keeps.
