@@ -154,7 +154,7 @@ impl<E: Element> Optimiser<E> {
 /// Scales the gradient so that its Euclidean norm is at most `max`, and returns the norm it had.
 ///
 /// As PyTorch's `clip_grad_norm_`: the scale is max / (norm + 1e-6) where that is below 1. The norm is summed in `f64`, in
-/// the order of the parameters. A norm that is not finite leaves the gradient as it is.
+/// an order that never changes. A norm that is not finite leaves the gradient as it is.
 pub fn clip_gradient_norm<R: Real>(gradient: &mut [R], max: f64) -> f64 {
     let mut sums = [0.0; 8];
     for part in gradient.chunks(sums.len()) {

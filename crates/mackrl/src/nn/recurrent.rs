@@ -17,7 +17,9 @@ use crate::{
 };
 
 /// Rows of a block of the backward pass, at least: the gradients of the weights are taken over as many whole steps together.
-/// More rows mean fewer passes over the gradient, fewer rows mean that activations are still in the second cache.
+///
+/// Step by step, small batches load and store the whole gradient for a few rows (6 rows: 1.6 ms an update instead of 1.1);
+/// over the whole episode, large batches come back from the third cache (80 rows: 30 ms instead of 17, beside other load).
 const BLOCK_ROWS: usize = 128;
 
 /// The sizes of a [`RecurrentNetwork`].
