@@ -149,3 +149,155 @@ fn horner<S: Simd>(simd: S, coefficients: &[f32], x: S::f32s) -> S::f32s {
     }
     sum
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::nn::lanes::{
+        BLOCK, Element, Kernel, Lanes,
+        forced::{Width, with_width},
+    };
+
+    #[derive(Debug, Clone, Copy)]
+    enum Function {
+        Exp,
+        Ln,
+        Tanh,
+        Sigmoid,
+    }
+
+    impl Function {
+        /// The function of each number, through the kernels.
+        fn of(self, numbers: &[f32]) -> Vec<f32> {
+            let mut results = numbers.to_vec();
+            f32::dispatch(Apply {
+                function: self,
+                values: &mut results,
+            });
+            results
+        }
+
+        fn exact(self, x: f64) -> f64 {
+            match self {
+                Self::Exp => x.exp(),
+                Self::Ln => x.ln(),
+                Self::Tanh => x.tanh(),
+                Self::Sigmoid => 1.0 / (1.0 + (-x).exp()),
+            }
+        }
+    }
+
+    struct Apply<'a> {
+        function: Function,
+        values: &'a mut [f32],
+    }
+
+    impl Kernel<f32> for Apply<'_> {
+        type Output = ();
+
+        fn run<L: Lanes<Element = f32>>(self, lanes: L) {
+            for part in self.values.chunks_mut(L::LANES) {
+                let x = lanes.load(part);
+                let y = match self.function {
+                    Function::Exp => lanes.exp(x),
+                    Function::Ln => lanes.ln(x),
+                    Function::Tanh => lanes.tanh(x),
+                    Function::Sigmoid => lanes.sigmoid(x),
+                };
+                lanes.store(part, y);
+            }
+        }
+    }
+
+    /// Largest error in units of the last place over evenly spaced numbers.
+    fn largest_error(function: Function, from: f64, to: f64) -> f64 {
+        const COUNT: i32 = 100_003;
+        let numbers: Vec<f32> = (0..COUNT)
+            .map(|i| crate::Real::from_f64(from + (to - from) * f64::from(i) / f64::from(COUNT)))
+            .collect();
+        let results = function.of(&numbers);
+        let errors = numbers.iter().zip(results).map(|(&x, y)| {
+            let exact = function.exact(f64::from(x));
+            let unit = f64::from(y.abs().next_up()) - f64::from(y.abs());
+            (f64::from(y) - exact).abs() / unit
+        });
+        errors.fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn results_are_accurate_to_a_few_units_in_the_last_place() {
+        for (function, from, to) in [
+            (Function::Exp, -87.0, 88.0),
+            (Function::Exp, -1.0, 1.0),
+            (Function::Ln, 1e-6, 1e-3),
+            (Function::Ln, 0.01, 3.0),
+            (Function::Ln, 3.0, 1e4),
+            (Function::Tanh, -12.0, 12.0),
+            (Function::Tanh, -0.3, 0.3),
+            (Function::Sigmoid, -86.0, 90.0),
+            (Function::Sigmoid, -3.0, 3.0),
+        ] {
+            let error = largest_error(function, from, to);
+            assert!(error < 4.0, "{function:?} in [{from}, {to}]: {error} units");
+        }
+    }
+
+    #[test]
+    fn results_saturate_and_are_never_denormal() {
+        let far = [
+            -f32::INFINITY,
+            -1e30,
+            -200.0,
+            -90.0,
+            90.0,
+            200.0,
+            1e30,
+            f32::INFINITY,
+        ];
+        assert_eq!(
+            Function::Exp.of(&far)[..4],
+            [0.0; 4],
+            "vanishing exponentials"
+        );
+        assert!(
+            Function::Exp.of(&far).iter().all(|x| x.is_finite()),
+            "large exponentials"
+        );
+        assert_eq!(
+            Function::Tanh.of(&far),
+            [-1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0, 1.0],
+            "tanh"
+        );
+        assert_eq!(Function::Sigmoid.of(&far)[4..], [1.0; 4], "sigmoid");
+        let low = &Function::Sigmoid.of(&far)[..4];
+        assert!(
+            low.iter().all(|&x| x < 1e-37 && x.is_normal()),
+            "sigmoid: {low:?}"
+        );
+        assert_eq!(Function::Ln.of(&[1.0]), [0.0], "ln 1");
+        assert_eq!(Function::Exp.of(&[0.0]), [1.0], "exp 0");
+    }
+
+    #[test]
+    fn nan_stays_nan() {
+        for function in [
+            Function::Exp,
+            Function::Ln,
+            Function::Tanh,
+            Function::Sigmoid,
+        ] {
+            assert!(function.of(&[f32::NAN])[0].is_nan(), "{function:?}");
+        }
+    }
+
+    #[test]
+    fn every_width_gives_the_same_bits() {
+        let numbers: Vec<f32> = (0..4 * BLOCK + 5).map(|i| i as f32 * 0.37 - 9.0).collect();
+        for function in [Function::Exp, Function::Tanh, Function::Sigmoid] {
+            let widest = function.of(&numbers);
+            for width in [Width::Scalar, Width::Avx2] {
+                let narrow = with_width(width, || function.of(&numbers));
+                assert_eq!(narrow, widest, "{function:?} with {width:?}");
+            }
+        }
+    }
+}

@@ -1,4 +1,4 @@
-//! The feed-forward network of the critics: Linear + ReLU, Linear.
+//! The feed-forward network of the critics: Linear + `ReLU`, Linear.
 
 use mackrl_env::EpisodeKey;
 
@@ -13,7 +13,7 @@ use crate::{
     },
 };
 
-/// Linear + ReLU, Linear; as places in a flat parameter vector.
+/// Linear + `ReLU`, Linear; as places in a flat parameter vector.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FeedForward {
     input: Linear,

@@ -10,7 +10,8 @@ use crate::{
         aligned::Aligned,
         lanes::Element,
         parameters::{ParameterLayout, fill_uniform},
-        product::{ColumnSums, Packed, Product, Rows, Start, WeightGradient},
+        product::{Packed, Product, Rows, Start},
+        weight_gradient::{ColumnSums, WeightGradient},
     },
 };
 
@@ -34,7 +35,7 @@ pub(crate) struct LinearWeights<R> {
 }
 
 impl Linear {
-    /// Adds `{name}.weight` [outputs, inputs] and `{name}.bias` [outputs] to a layout.
+    /// Adds `{name}.weight` [outputs, inputs] and `{name}.bias` `[outputs]` to a layout.
     pub fn new(layout: &mut ParameterLayout, name: &str, inputs: usize, outputs: usize) -> Self {
         Self {
             inputs,

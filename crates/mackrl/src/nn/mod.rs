@@ -19,6 +19,7 @@ mod aligned;
 pub mod benchmark;
 mod elementary;
 mod feed_forward;
+mod gates;
 mod gru;
 mod lanes;
 mod linear;
@@ -27,7 +28,10 @@ mod parameters;
 mod product;
 mod recurrent;
 mod softmax;
+#[cfg(test)]
+mod tests;
 mod trace;
+mod weight_gradient;
 
 pub use feed_forward::{FeedForward, FeedForwardTrace, FeedForwardWeights};
 pub use gru::Gru;

@@ -1,4 +1,4 @@
-//! Adam and RMSprop with PyTorch's semantics, and what surrounds an update: clipping and the search for broken numbers.
+//! Adam and `RMSprop` with PyTorch's semantics, and what surrounds an update: clipping and the search for broken numbers.
 
 use crate::{
     Real,
@@ -33,7 +33,7 @@ impl OptimiserKind {
         beta2: 0.999,
         epsilon: 1e-8,
     };
-    /// RMSprop with PyTorch's usual constants: 0.99, 1e-8.
+    /// `RMSprop` with PyTorch's usual constants: 0.99, 1e-8.
     pub const RMSPROP: Self = Self::RmsProp {
         smoothing: 0.99,
         epsilon: 1e-8,
@@ -45,7 +45,7 @@ impl OptimiserKind {
 pub struct Moments<R> {
     /// Steps taken.
     pub steps: u64,
-    /// Averages of gradients; empty for RMSprop.
+    /// Averages of gradients; empty for `RMSprop`.
     pub first: Vec<R>,
     /// Averages of squared gradients.
     pub second: Vec<R>,
@@ -154,7 +154,7 @@ impl<E: Element> Optimiser<E> {
 /// Scales the gradient so that its Euclidean norm is at most `max`, and returns the norm it had.
 ///
 /// As PyTorch's `clip_grad_norm_`: the scale is max / (norm + 1e-6) where that is below 1. The norm is summed in `f64`, in
-/// the order of the parameters. A norm that is not finite leaves the gradient as it is.
+/// an order that never changes. A norm that is not finite leaves the gradient as it is.
 pub fn clip_gradient_norm<R: Real>(gradient: &mut [R], max: f64) -> f64 {
     let mut sums = [0.0; 8];
     for part in gradient.chunks(sums.len()) {
@@ -237,6 +237,47 @@ impl<E: Element> Kernel<E> for RmsProp<'_, E> {
         for (&g, (v, parameter)) in self.gradient.iter().zip(states) {
             *v = smoothing * *v + (E::ONE - smoothing) * (g * g);
             *parameter -= size * g / (v.sqrt() + epsilon);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clipping_shortens_long_gradients_only() {
+        let mut gradient = [3.0_f64, 0.0, -4.0];
+        assert_eq!(clip_gradient_norm(&mut gradient, 10.0), 5.0, "norm");
+        assert_eq!(gradient, [3.0, 0.0, -4.0], "a short gradient");
+        assert_eq!(clip_gradient_norm(&mut gradient, 1.0), 5.0, "norm");
+        let norm = clip_gradient_norm(&mut gradient, 1.0);
+        assert!((norm - 1.0).abs() < 1e-6, "norm after clipping: {norm}");
+    }
+
+    #[test]
+    fn the_first_broken_number_is_found() {
+        let mut numbers = vec![1.0_f32; 1009];
+        assert_eq!(first_not_finite(&numbers), None, "all finite");
+        numbers[701] = f32::NAN;
+        numbers[809] = f32::INFINITY;
+        assert_eq!(first_not_finite(&numbers), Some(701), "first of two");
+        numbers[13] = f32::NEG_INFINITY;
+        assert_eq!(first_not_finite(&numbers), Some(13), "first of three");
+    }
+
+    #[test]
+    fn an_optimiser_continues_from_its_moments() {
+        for kind in [OptimiserKind::ADAM, OptimiserKind::RMSPROP] {
+            let mut whole = Optimiser::<f32>::new(kind, 3);
+            let mut parameters = [0.1, 0.2, 0.3];
+            whole.step(0.01, &[1.0, -2.0, 3.0], &mut parameters);
+            let mut resumed = Optimiser::new(kind, 3);
+            resumed.restore(whole.moments().clone());
+            let mut continued = parameters;
+            whole.step(0.01, &[0.5, 0.5, -0.5], &mut parameters);
+            resumed.step(0.01, &[0.5, 0.5, -0.5], &mut continued);
+            assert_eq!(parameters, continued, "{kind:?}");
         }
     }
 }

@@ -15,7 +15,7 @@ use crate::Real;
 pub struct TensorSpec {
     /// Its name, such as `pair_controller.gru.weight_ih`.
     pub name: String,
-    /// Its shape as PyTorch has it: [outputs, inputs] or [outputs].
+    /// Its shape as PyTorch has it: [outputs, inputs] or `[outputs]`.
     pub shape: Vec<usize>,
     /// Where it lies in the flat vector.
     pub range: Range<usize>,

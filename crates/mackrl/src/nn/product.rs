@@ -16,7 +16,7 @@ use crate::{
 /// Columns of a panel: 64 numbers are four AVX-512 vectors.
 const PANEL: usize = 64;
 /// Rows of the largest register tile.
-const TILE: usize = 6;
+pub(super) const TILE: usize = 6;
 
 /// A matrix of rows that may lie apart: row `r` starts at `values[r * stride]`.
 #[derive(Debug, Clone, Copy)]
@@ -92,7 +92,7 @@ pub(crate) enum Start<'a, R> {
     Zero,
 }
 
-/// c[r, j] = start[r, j] + Σ_k a[r, k] b[k, j], for r in 0..`rows`.
+/// `c[r, j] = start[r, j] + Σ_k a[r, k] b[k, j]`, for r in 0..`rows`.
 #[derive(Debug)]
 pub(crate) struct Product<'a, R> {
     pub(crate) rows: usize,
@@ -116,13 +116,15 @@ impl<E: Element> Product<'_, E> {
             let width = self.b.width_at(column);
             let panel = &self.b.values.as_slice()[column * self.b.inner..][..width * self.b.inner];
             let per_row = width / L::LANES;
+            // Vectors that hold padding alone are left out.
+            let used = width.min(self.b.columns - column).div_ceil(L::LANES);
             let mut first = 0;
-            while first < per_row {
+            while first < used {
                 let at = column + first * L::LANES;
-                if per_row - first >= VECTORS {
+                if used - first >= VECTORS {
                     self.strip::<L, VECTORS>(lanes, panel, per_row, first, at);
                     first += VECTORS;
-                } else if per_row - first >= 2 {
+                } else if used - first >= 2 {
                     self.strip::<L, 2>(lanes, panel, per_row, first, at);
                     first += 2;
                 } else {
@@ -190,9 +192,13 @@ impl<E: Element> Product<'_, E> {
         for (i, a) in a.iter_mut().enumerate() {
             *a = &self.a.values[(row + i) * self.a.stride..][..inner];
         }
-        for (k, b) in panel.chunks_exact(per_row).enumerate() {
-            multiply_add(lanes, &a, k, &b[first..], &mut sums);
-        }
+        let sums = {
+            let mut held = sums;
+            for (k, b) in panel.chunks_exact(per_row).enumerate() {
+                multiply_add(lanes, &a, k, &b[first..], &mut held);
+            }
+            held
+        };
         for (i, sum) in sums.iter().enumerate() {
             let place = (row + i) * self.c_stride + column;
             store_row(lanes, &mut self.c[place..][..length], sum);
@@ -210,178 +216,6 @@ impl<E: Element> Kernel<E> for Product<'_, E> {
             self.panels::<L, 4>(lanes);
         } else {
             self.panels::<L, 2>(lanes);
-        }
-    }
-}
-
-/// gradient[k, j] += Σ_r a[r, k] d[r, j], for r in 0..`rows`: the gradient of a weight, from its layer's inputs `a`
-/// [rows, inner] and the gradient `d` [rows, columns] of its outputs.
-#[derive(Debug)]
-pub(crate) struct WeightGradient<'a, R> {
-    pub(crate) rows: usize,
-    pub(crate) inner: usize,
-    pub(crate) columns: usize,
-    pub(crate) a: Rows<'a, R>,
-    pub(crate) d: Rows<'a, R>,
-    pub(crate) gradient: &'a mut [R],
-    pub(crate) gradient_stride: usize,
-    /// Room for 16 numbers a row.
-    pub(crate) scratch: &'a mut Aligned<R>,
-}
-
-impl<E: Element> WeightGradient<'_, E> {
-    /// Computes it.
-    pub(crate) fn compute(self) {
-        E::dispatch(self);
-    }
-
-    #[inline(always)]
-    fn strips<L: Lanes<Element = E>, const VECTORS: usize>(mut self, lanes: L) {
-        let whole = self.columns - self.columns % BLOCK;
-        let d = self.d;
-        let mut column = 0;
-        while column < whole {
-            if whole - column >= VECTORS * L::LANES {
-                self.strip::<L, VECTORS>(lanes, d, column, column);
-                column += VECTORS * L::LANES;
-            } else if whole - column >= 2 * L::LANES {
-                self.strip::<L, 2>(lanes, d, column, column);
-                column += 2 * L::LANES;
-            } else {
-                self.strip::<L, 1>(lanes, d, column, column);
-                column += L::LANES;
-            }
-        }
-        if whole < self.columns {
-            self.rest(lanes, whole);
-        }
-    }
-
-    /// The last columns, fewer than 16: copied to a padded matrix first.
-    #[inline(always)]
-    fn rest<L: Lanes<Element = E>>(&mut self, lanes: L, whole: usize) {
-        let length = self.columns - whole;
-        let mut scratch = std::mem::take(self.scratch);
-        scratch.grow(self.rows * BLOCK);
-        let padded = scratch.as_mut_slice().chunks_exact_mut(BLOCK);
-        for (padded, d) in padded
-            .zip(self.d.values.chunks(self.d.stride))
-            .take(self.rows)
-        {
-            padded[..length].copy_from_slice(&d[whole..][..length]);
-            padded[length..].fill(E::ZERO);
-        }
-        let d = Rows {
-            values: scratch.as_slice(),
-            stride: BLOCK,
-        };
-        for first in (0..length).step_by(L::LANES) {
-            self.strip::<L, 1>(lanes, d, first, whole + first);
-        }
-        *self.scratch = scratch;
-    }
-
-    /// All rows of the gradient, for the `VECTORS` vectors of columns that start at `from` in `d` and at `to` in the gradient.
-    #[inline(always)]
-    fn strip<L: Lanes<Element = E>, const VECTORS: usize>(
-        &mut self,
-        lanes: L,
-        d: Rows<'_, E>,
-        from: usize,
-        to: usize,
-    ) {
-        let mut k = 0;
-        while k < self.inner {
-            let left = self.inner - k;
-            if left >= TILE {
-                self.tile::<L, TILE, VECTORS>(lanes, d, from, to, k);
-                k += TILE;
-            } else if left >= 4 {
-                self.tile::<L, 4, VECTORS>(lanes, d, from, to, k);
-                k += 4;
-            } else {
-                self.tile::<L, 1, VECTORS>(lanes, d, from, to, k);
-                k += 1;
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn tile<L: Lanes<Element = E>, const ROWS: usize, const VECTORS: usize>(
-        &mut self,
-        lanes: L,
-        d: Rows<'_, E>,
-        from: usize,
-        to: usize,
-        first: usize,
-    ) {
-        let length = (self.columns - to).min(VECTORS * L::LANES);
-        let mut sums = [[lanes.splat(E::ZERO); VECTORS]; ROWS];
-        for (i, sum) in sums.iter_mut().enumerate() {
-            let place = (first + i) * self.gradient_stride + to;
-            load_row(lanes, &self.gradient[place..][..length], sum);
-        }
-        let a = self.a.values.chunks(self.a.stride);
-        for (a, d) in a.zip(d.values.chunks(d.stride)).take(self.rows) {
-            let a = &a[first..][..ROWS];
-            let d = L::vectors(&d[from..][..VECTORS * L::LANES]);
-            for (sum, &a) in sums.iter_mut().zip(a) {
-                let a = lanes.splat(a);
-                for (sum, &d) in sum.iter_mut().zip(d) {
-                    *sum = lanes.mul_add(a, d, *sum);
-                }
-            }
-        }
-        for (i, sum) in sums.iter().enumerate() {
-            let place = (first + i) * self.gradient_stride + to;
-            store_row(lanes, &mut self.gradient[place..][..length], sum);
-        }
-    }
-}
-
-impl<E: Element> Kernel<E> for WeightGradient<'_, E> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<L: Lanes<Element = E>>(self, lanes: L) {
-        if L::LANES == BLOCK {
-            self.strips::<L, 4>(lanes);
-        } else {
-            self.strips::<L, 2>(lanes);
-        }
-    }
-}
-
-/// sums[j] += Σ_r d[r, j], for r in 0..`rows`: the gradient of a bias.
-#[derive(Debug)]
-pub(crate) struct ColumnSums<'a, R> {
-    pub(crate) rows: usize,
-    pub(crate) d: Rows<'a, R>,
-    pub(crate) sums: &'a mut [R],
-}
-
-impl<E: Element> ColumnSums<'_, E> {
-    /// Computes it.
-    pub(crate) fn compute(self) {
-        E::dispatch(self);
-    }
-}
-
-impl<E: Element> Kernel<E> for ColumnSums<'_, E> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<L: Lanes<Element = E>>(self, lanes: L) {
-        let columns = self.sums.len();
-        for d in self.d.values.chunks(self.d.stride).take(self.rows) {
-            for (sums, d) in self
-                .sums
-                .chunks_mut(L::LANES)
-                .zip(d[..columns].chunks(L::LANES))
-            {
-                let sum = lanes.add(lanes.load(sums), lanes.load(d));
-                lanes.store(sums, sum);
-            }
         }
     }
 }
@@ -405,25 +239,29 @@ fn multiply_add<L: Lanes, const ROWS: usize, const VECTORS: usize>(
 }
 
 /// Loads vectors from a slice that may be shorter than they are.
+///
+/// Here and in [`store_row`] the loop has a constant length, or else the compiler keeps the sums in memory.
 #[inline(always)]
-fn load_row<L: Lanes, const VECTORS: usize>(
+pub(super) fn load_row<L: Lanes, const VECTORS: usize>(
     lanes: L,
     slice: &[L::Element],
     vectors: &mut [L::Vector; VECTORS],
 ) {
-    for (vector, part) in vectors.iter_mut().zip(slice.chunks(L::LANES)) {
-        *vector = lanes.load(part);
+    for (v, vector) in vectors.iter_mut().enumerate() {
+        let [from, to] = [v, v + 1].map(|v| slice.len().min(v * L::LANES));
+        *vector = lanes.load(&slice[from..to]);
     }
 }
 
 /// Stores as much of the vectors as the slice holds.
 #[inline(always)]
-fn store_row<L: Lanes, const VECTORS: usize>(
+pub(super) fn store_row<L: Lanes, const VECTORS: usize>(
     lanes: L,
     slice: &mut [L::Element],
     vectors: &[L::Vector; VECTORS],
 ) {
-    for (&vector, part) in vectors.iter().zip(slice.chunks_mut(L::LANES)) {
-        lanes.store(part, vector);
+    for (v, &vector) in vectors.iter().enumerate() {
+        let [from, to] = [v, v + 1].map(|v| slice.len().min(v * L::LANES));
+        lanes.store(&mut slice[from..to], vector);
     }
 }

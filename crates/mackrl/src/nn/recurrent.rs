@@ -1,4 +1,4 @@
-//! The recurrent network of every controller: Linear + ReLU, a gated recurrent unit, Linear.
+//! The recurrent network of every controller: Linear + `ReLU`, a gated recurrent unit, Linear.
 
 use std::ops::Range;
 
@@ -7,7 +7,8 @@ use mackrl_env::EpisodeKey;
 use crate::{
     Real,
     nn::{
-        gru::{GATES, Gru, GruWeights},
+        gates::GATES,
+        gru::{Gru, GruWeights},
         lanes::{Element, Kernel, Lanes},
         linear::{Linear, LinearWeights},
         parameters::ParameterLayout,
@@ -16,7 +17,9 @@ use crate::{
 };
 
 /// Rows of a block of the backward pass, at least: the gradients of the weights are taken over as many whole steps together.
-/// More rows mean fewer passes over the gradient, fewer rows mean that activations are still in the second cache.
+///
+/// Step by step, small batches load and store the whole gradient for a few rows (6 rows: 1.6 ms an update instead of 1.1);
+/// over the whole episode, large batches come back from the third cache (80 rows: 30 ms instead of 17, beside other load).
 const BLOCK_ROWS: usize = 128;
 
 /// The sizes of a [`RecurrentNetwork`].
@@ -30,7 +33,7 @@ pub struct NetworkSizes {
     pub outputs: usize,
 }
 
-/// Linear + ReLU, a gated recurrent unit, Linear; as places in a flat parameter vector.
+/// Linear + `ReLU`, a gated recurrent unit, Linear; as places in a flat parameter vector.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RecurrentNetwork {
     input: Linear,

@@ -9,7 +9,7 @@ use crate::nn::lanes::{BLOCK, Element, Kernel, Lanes};
 /// Log-probabilities of the available columns of each row, explored with probability ε.
 ///
 /// # Equation
-/// log p_c = log((1 − ε) s_c + ε / n), s = softmax over the n available columns; log p_c = −∞ where column c is masked.
+/// `log p_c = log((1 − ε) s_c + ε / n)`, s = softmax over the n available columns; `log p_c = −∞` where column c is masked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MaskedLogSoftmax<R> {
     /// Length of a row.
@@ -53,13 +53,13 @@ impl<E: Element> MaskedLogSoftmax<E> {
 
     /// Gives the gradient of one row of logits from that of a few of its log-probabilities.
     ///
-    /// `weights` lists columns c with w_c = ∂J/∂ log p_c; a column may come twice. A masked column has no gradient.
+    /// `weights` lists columns c with `w_c = ∂J/∂ log p_c`; a column may come twice. A masked column has no gradient.
     ///
     /// # Equation
-    /// g_c = w_c (1 − ε) s_c / p_c, ∂J/∂logit_j = g_j − s_j Σ_c g_c
+    /// `g_c = w_c (1 − ε) s_c / p_c`, `∂J/∂logit_j = g_j − s_j Σ_c g_c`
     ///
     /// # Shapes
-    /// `log_p`, `softmax` and `gradient` [columns]: one row of what [`forward`](Self::forward) gave, and the result.
+    /// `log_p`, `softmax` and `gradient` `[columns]`: one row of what [`forward`](Self::forward) gave, and the result.
     ///
     /// # Panics
     /// If a column is out of range.

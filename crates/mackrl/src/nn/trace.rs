@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use crate::{
     Real,
-    nn::{aligned::Aligned, gru::GATES, recurrent::NetworkSizes},
+    nn::{aligned::Aligned, gates::GATES, recurrent::NetworkSizes},
 };
 
 /// How much of an episode a [`Trace`] keeps.
@@ -268,4 +268,55 @@ impl<R: Real> Trace<R> {
 
 fn rows_of<R: Real>(buffer: &Aligned<R>, rows: Range<usize>, columns: usize) -> &[R] {
     &buffer.as_slice()[rows.start * columns..rows.end * columns]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZES: NetworkSizes = NetworkSizes {
+        inputs: 3,
+        hidden: 5,
+        outputs: 7,
+    };
+
+    fn run_episode(trace: &mut Trace<f32>, steps: usize) {
+        trace.begin_episode();
+        for _ in 0..steps {
+            trace.begin_step(11, None);
+            trace.input_mut().fill(1.0);
+            let t = trace.steps() - 1;
+            trace.logits_gradient_mut(t).fill(1.0);
+        }
+    }
+
+    #[test]
+    fn a_later_episode_moves_no_buffer() {
+        let mut trace = Trace::new(SIZES, Retention::Episode);
+        run_episode(&mut trace, 13);
+        let places = [trace.inputs(0).as_ptr(), trace.logits(0).as_ptr()];
+        run_episode(&mut trace, 13);
+        assert_eq!(trace.inputs(0).as_ptr(), places[0], "place of the inputs");
+        assert_eq!(trace.logits(0).as_ptr(), places[1], "place of the logits");
+    }
+
+    #[test]
+    fn inputs_are_zero_when_a_step_begins() {
+        let mut trace = Trace::new(SIZES, Retention::Episode);
+        run_episode(&mut trace, 2);
+        trace.begin_episode();
+        trace.begin_step(2, None);
+        assert_eq!(trace.input_mut(), [0.0; 6], "inputs");
+    }
+
+    #[test]
+    fn a_trace_of_the_last_step_does_not_grow() {
+        let mut trace = Trace::<f32>::new(SIZES, Retention::LastStep);
+        for t in 0..17 {
+            trace.begin_step(2, None);
+            assert_eq!(trace.steps(), t + 1, "steps begun");
+            assert_eq!(trace.rows(t), 2, "rows of the current step");
+        }
+        assert_eq!(trace.last_rows(), 0..2, "place of the last step");
+    }
 }

@@ -1,0 +1,151 @@
+//! The contract of decentralised execution: a row's results depend on that row and the parameters, to the bit.
+
+use super::{SIZES, network, numbers};
+use crate::nn::{
+    MaskedLogSoftmax, NetworkSizes, Retention, Trace,
+    lanes::forced::{Width, with_width},
+};
+
+const STEPS: usize = 3;
+/// Wider than a panel, with a rest of columns.
+const WIDE: NetworkSizes = NetworkSizes {
+    inputs: 37,
+    hidden: 64,
+    outputs: 122,
+};
+
+/// All numbers that an agent bases a decision on, for one row: logits and explored log-probabilities of every step.
+fn row_results(
+    sizes: NetworkSizes,
+    rows: usize,
+    position: usize,
+    retention: Retention,
+) -> Vec<u32> {
+    let (network, _, weights) = network::<f32>(sizes);
+    let mut trace = Trace::new(sizes, retention);
+    let mut results = Vec::new();
+    for t in 0..STEPS {
+        trace.begin_step(rows, None);
+        for (row, input) in trace.input_mut().chunks_exact_mut(sizes.inputs).enumerate() {
+            let seed = if row == position { 0 } else { 1 + row };
+            input.copy_from_slice(&numbers::<f32>(sizes.inputs, 1000 * t + seed));
+        }
+        network.step(&weights, &mut trace);
+        let mask: Vec<bool> = (0..rows * sizes.outputs)
+            .map(|place| (place % sizes.outputs) % 5 != 2)
+            .collect();
+        let (mut log_p, mut softmax) = (vec![0.0; mask.len()], vec![0.0; mask.len()]);
+        for epsilon in [0.0, 0.25] {
+            let law = MaskedLogSoftmax {
+                columns: sizes.outputs,
+                epsilon,
+            };
+            law.forward(trace.last_logits(), &mask, &mut log_p, &mut softmax);
+            let place = position * sizes.outputs..(position + 1) * sizes.outputs;
+            for values in [trace.last_logits(), &log_p, &softmax] {
+                results.extend(values[place.clone()].iter().map(|value| value.to_bits()));
+            }
+        }
+    }
+    results
+}
+
+#[test]
+fn a_row_alone_equals_the_row_in_any_batch_at_any_position() {
+    for sizes in [SIZES, WIDE] {
+        let alone = row_results(sizes, 1, 0, Retention::Episode);
+        for rows in [2, 7, 40, 83] {
+            for position in 0..rows {
+                let among = row_results(sizes, rows, position, Retention::Episode);
+                assert_eq!(among, alone, "row {position} of {rows}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_width_of_vector_gives_the_same_bits() {
+    for sizes in [SIZES, WIDE] {
+        for (rows, position) in [(1, 0), (7, 3), (13, 12)] {
+            let widest = row_results(sizes, rows, position, Retention::Episode);
+            for width in [Width::Scalar, Width::Avx2] {
+                let narrow = with_width(width, || {
+                    row_results(sizes, rows, position, Retention::Episode)
+                });
+                assert_eq!(narrow, widest, "{width:?}, row {position} of {rows}");
+            }
+        }
+    }
+}
+
+#[test]
+fn keeping_the_last_step_alone_changes_nothing() {
+    let all = row_results(WIDE, 5, 2, Retention::Episode);
+    assert_eq!(row_results(WIDE, 5, 2, Retention::LastStep), all, "results");
+}
+
+#[test]
+fn rows_that_leave_change_nothing_for_those_that_stay() {
+    let (network, _, weights) = network::<f32>(SIZES);
+    let logits = |carry: Option<&[usize]>, watched: usize, rows: usize| {
+        let mut trace = Trace::new(SIZES, Retention::Episode);
+        trace.begin_step(5, None);
+        trace
+            .input_mut()
+            .copy_from_slice(&numbers(5 * SIZES.inputs, 0));
+        network.step(&weights, &mut trace);
+        trace.begin_step(rows, carry);
+        trace.input_mut().fill(0.5);
+        network.step(&weights, &mut trace);
+        trace.logits(1)[watched * SIZES.outputs..][..SIZES.outputs].to_vec()
+    };
+    let stays = logits(None, 3, 5);
+    assert_eq!(logits(Some(&[4, 3]), 1, 2), stays, "row 3, now row 1");
+    assert_ne!(logits(Some(&[4, 3]), 0, 2), stays, "row 4, now row 0");
+}
+
+#[test]
+fn f32_equals_f64_up_to_rounding() {
+    let sizes = WIDE;
+    let (rows, steps) = (43, 5);
+    let (network32, parameters, weights32) = network::<f32>(sizes);
+    let parameters: Vec<f64> = parameters.iter().map(|&x| f64::from(x)).collect();
+    let weights64 = network32.weights(&parameters);
+    let mut trace32 = Trace::<f32>::new(sizes, Retention::Episode);
+    let mut trace64 = Trace::<f64>::new(sizes, Retention::Episode);
+    for t in 0..steps {
+        let input = numbers::<f32>(rows * sizes.inputs, t);
+        trace32.begin_step(rows, None);
+        trace32.input_mut().copy_from_slice(&input);
+        network32.step(&weights32, &mut trace32);
+        trace64.begin_step(rows, None);
+        for (to, &from) in trace64.input_mut().iter_mut().zip(&input) {
+            *to = f64::from(from);
+        }
+        network32.step(&weights64, &mut trace64);
+        for (&single, &double) in trace32.logits(t).iter().zip(trace64.logits(t)) {
+            assert!(
+                (f64::from(single) - double).abs() < 2e-6,
+                "{single} is not {double}"
+            );
+        }
+    }
+    for t in 0..steps {
+        let gradient = numbers::<f32>(rows * sizes.outputs, 100 + t);
+        trace32.logits_gradient_mut(t).copy_from_slice(&gradient);
+        for (to, &from) in trace64.logits_gradient_mut(t).iter_mut().zip(&gradient) {
+            *to = f64::from(from);
+        }
+    }
+    let mut gradient32 = vec![0.0_f32; parameters.len()];
+    let mut gradient64 = vec![0.0_f64; parameters.len()];
+    network32.backward(&weights32, &mut trace32, &mut gradient32);
+    network32.backward(&weights64, &mut trace64, &mut gradient64);
+    let largest = gradient64
+        .iter()
+        .fold(0.0_f64, |largest, g| largest.max(g.abs()));
+    for (i, (&single, &double)) in gradient32.iter().zip(&gradient64).enumerate() {
+        let error = (f64::from(single) - double).abs() / largest;
+        assert!(error < 2e-6, "parameter {i}: {single} is not {double}");
+    }
+}
