@@ -9,7 +9,10 @@ use mackrl_env::{
 
 fn main() -> Result<(), MakeError> {
     let episodes = 200;
-    println!("{:>14} {:>12} {:>6} {:>7} {:>7}", "map", "policy", "wins", "return", "length");
+    println!(
+        "{:>14} {:>12} {:>6} {:>7} {:>7}",
+        "map", "policy", "wins", "return", "length"
+    );
     for name in registry::names() {
         let mut environment = registry::make(name, &SkirmishSettings::default())?;
         for policy in ScriptedPolicy::ALL {
@@ -32,7 +35,14 @@ fn play(environment: &mut dyn Environment, policy: ScriptedPolicy, episodes: u64
         let key = EpisodeKey::new(1, Stream::Other, episode);
         environment.reset(key, &mut observations.row_mut(0));
         for step in 0.. {
-            policy.act(&spec, prior.as_ref(), &observations, 0, (key, step), &mut actions);
+            policy.act(
+                &spec,
+                prior.as_ref(),
+                &observations,
+                0,
+                (key, step),
+                &mut actions,
+            );
             let time_step = environment
                 .step(&actions, &mut observations.row_mut(0))
                 .expect("scripted policies choose available actions");

@@ -5,7 +5,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Action, AgentId, Draw, EntityId, EnvironmentSpec, EpisodeKey, LocalView, Observations, PriorKnowledge,
+    Action, AgentId, Draw, EntityId, EnvironmentSpec, EpisodeKey, LocalView, Observations,
+    PriorKnowledge,
 };
 
 /// First features of an entity: position and life.
@@ -76,10 +77,17 @@ impl ScriptedPolicy {
 }
 
 fn nth_available(available: &[bool], uniform: f64) -> usize {
-    let count = available.iter().filter(|is_available| **is_available).count();
+    let count = available
+        .iter()
+        .filter(|is_available| **is_available)
+        .count();
     let mut left = uniform * count as f64;
     let mut last = 0;
-    for (action, _) in available.iter().enumerate().filter(|(_, is_available)| **is_available) {
+    for (action, _) in available
+        .iter()
+        .enumerate()
+        .filter(|(_, is_available)| **is_available)
+    {
         last = action;
         left -= 1.0;
         if left < 0.0 {
@@ -99,8 +107,12 @@ fn best_target(
     let mut best = None;
     let mut least = f32::INFINITY;
     for entity in view.seen().set().iter() {
-        let Some(action) = prior.action_on(entity).map(Action::index) else { continue };
-        let Some(features) = view.seen().get(entity) else { continue };
+        let Some(action) = prior.action_on(entity).map(Action::index) else {
+            continue;
+        };
+        let Some(features) = view.seen().get(entity) else {
+            continue;
+        };
         let found = score(features, distance_squared(own, features));
         if view.available()[action] && found < least {
             (best, least) = (Some(action), found);
@@ -114,16 +126,26 @@ fn approach(prior: &dyn PriorKnowledge, view: LocalView<'_>, is_patient: bool) -
     let own = view.seen().get(view.agent())?;
     let is_enemy = |entity: &EntityId| prior.action_on(*entity).is_some();
     let features = |entity| view.seen().get(entity);
-    let enemies = || view.seen().set().iter().filter(is_enemy).filter_map(features);
-    let mut allies = view.seen().set().iter().filter(|entity| !is_enemy(entity)).filter_map(features);
-    let has_begun = allies.any(|ally| {
-        enemies().any(|enemy| distance_squared(ally, enemy) <= ENGAGED * ENGAGED)
-    });
+    let enemies = || {
+        view.seen()
+            .set()
+            .iter()
+            .filter(is_enemy)
+            .filter_map(features)
+    };
+    let mut allies = view
+        .seen()
+        .set()
+        .iter()
+        .filter(|entity| !is_enemy(entity))
+        .filter_map(features);
+    let has_begun = allies
+        .any(|ally| enemies().any(|enemy| distance_squared(ally, enemy) <= ENGAGED * ENGAGED));
     if is_patient && !has_begun {
         return None;
     }
-    let nearest = enemies()
-        .min_by(|a, b| distance_squared(own, a).total_cmp(&distance_squared(own, b)))?;
+    let nearest =
+        enemies().min_by(|a, b| distance_squared(own, a).total_cmp(&distance_squared(own, b)))?;
     let (dx, dy) = (nearest[0] - own[0], nearest[1] - own[1]);
     let action = match (dx.abs() >= dy.abs(), dx >= 0.0, dy >= 0.0) {
         (true, true, _) => 4,

@@ -35,7 +35,10 @@ pub fn measure_speed(environment: &mut dyn Environment, duration: Duration) -> S
     let (mut steps, mut episodes) = (0, 0);
     let start = Instant::now();
     while start.elapsed() < duration {
-        environment.reset(EpisodeKey::new(1, Stream::Other, episodes), &mut observations.row_mut(0));
+        environment.reset(
+            EpisodeKey::new(1, Stream::Other, episodes),
+            &mut observations.row_mut(0),
+        );
         episodes += 1;
         loop {
             for (agent, action) in actions.iter_mut().enumerate() {
@@ -63,12 +66,19 @@ struct Dice(u64);
 
 impl Dice {
     fn pick(&mut self, available: &[bool]) -> usize {
-        let count = available.iter().filter(|is_available| **is_available).count() as u64;
+        let count = available
+            .iter()
+            .filter(|is_available| **is_available)
+            .count() as u64;
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
         self.0 ^= self.0 << 17;
         let mut left = (self.0 >> 32) * count >> 32;
-        for (action, _) in available.iter().enumerate().filter(|(_, is_available)| **is_available) {
+        for (action, _) in available
+            .iter()
+            .enumerate()
+            .filter(|(_, is_available)| **is_available)
+        {
             if left == 0 {
                 return action;
             }

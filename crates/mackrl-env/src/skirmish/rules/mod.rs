@@ -11,6 +11,7 @@ mod battle;
 mod chance;
 mod combat;
 mod movement;
+mod neighbours;
 mod opponent;
 mod placement;
 mod profile;
