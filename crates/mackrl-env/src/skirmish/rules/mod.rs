@@ -22,3 +22,6 @@ pub use chance::Chance;
 pub use placement::spread_around;
 pub use profile::{Battlefield, Profile, Strike};
 pub use state::{BattleState, Blow, Missile, Order, Stance, Team, Unit, UnitIndex};
+
+#[cfg(test)]
+mod tests;
