@@ -9,9 +9,13 @@ use mackrl_env::{
 };
 
 fn main() -> Result<(), MakeError> {
+    let names: Vec<String> = std::env::args().skip(1).collect();
     for name in registry::names() {
+        if !names.is_empty() && !names.iter().any(|wanted| wanted == name) {
+            continue;
+        }
         let mut environment = registry::make(name, &SkirmishSettings::default())?;
-        let speed = measure_speed(environment.as_mut(), Duration::from_millis(500));
+        let speed = measure_speed(environment.as_mut(), Duration::from_millis(1000));
         println!("{name:>18} {:>9.0} steps/s", speed.steps_per_second());
     }
     Ok(())

@@ -142,7 +142,7 @@ fn pushed_out_of_cell(x: f32, y: f32, radius: f32, cell_x: i32, cell_y: i32) -> 
     reason = "coordinates lie within the map"
 )]
 pub(crate) fn cell_of(coordinate: f32) -> i32 {
-    coordinate.floor() as i32
+    coordinate as i32
 }
 
 fn cell_index(x: i32, y: i32) -> Option<usize> {

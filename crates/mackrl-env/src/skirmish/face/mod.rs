@@ -9,3 +9,6 @@ mod state_vector;
 
 pub use environment::Skirmish;
 pub use knowledge::SkirmishKnowledge;
+
+#[cfg(test)]
+mod tests;

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use crate::skirmish::rules::{
     BattleState, Battlefield, Chance, Order, Stance, Team, Unit, UnitIndex,
     combat::Hit,
-    movement::{Footing, Neighbours},
+    movement::{Footing, Steps},
+    neighbours::Neighbours,
 };
 
 /// A battle: what changes, on what does not.
@@ -25,6 +26,8 @@ pub(super) struct Scratch {
     pub(super) footing: Vec<Footing>,
     /// Hits that land at the end of this loop.
     pub(super) hits: Vec<Hit>,
+    /// Where units are about to be.
+    pub(super) steps: Steps,
     /// Units that can be in each other's way.
     pub(super) neighbours: Neighbours,
 }
@@ -122,6 +125,7 @@ impl Battle {
         self.scratch.hits.reserve(4 * units);
         self.scratch.destination.resize(units, None);
         self.scratch.footing.resize(units, Footing::Standing);
+        self.scratch.steps.resize(units);
         self.scratch.neighbours.reserve(units);
     }
 }

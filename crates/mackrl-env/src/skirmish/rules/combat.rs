@@ -6,7 +6,7 @@
 //! stands for the backswing.
 
 use crate::skirmish::rules::{
-    Battle, Blow, Chance, Missile, Order, Profile, Stance, Strike, UnitIndex, movement::Footing,
+    Battle, Battlefield, Blow, Chance, Missile, Order, Stance, Strike, UnitIndex, movement::Footing,
 };
 
 /// A hit that lands at the end of the loop.
@@ -19,15 +19,17 @@ pub(super) struct Hit {
 impl Battle {
     /// Lets every living unit act on its order or its quarry: stand, attack, or choose where to walk.
     pub(super) fn act(&mut self, chance: &mut Chance) {
+        let field = self.field.clone();
         for index in 0..self.state.units.len() {
             self.scratch.destination[index] = None;
-            self.scratch.footing[index] = Footing::Standing;
             if !self.state.units[index].is_alive() {
+                self.scratch.footing[index] = Footing::Gone;
                 continue;
             }
+            self.scratch.footing[index] = Footing::Standing;
             self.tick(index);
             match self.target_of(index) {
-                Some(target) => self.fight(index, usize::from(target), chance),
+                Some(target) => self.fight(&field, index, usize::from(target), chance),
                 None => self.follow_order(index),
             }
         }
@@ -93,11 +95,10 @@ impl Battle {
     }
 
     /// One loop of fighting `target`: continue or start an attack, wait for the weapon, or walk closer.
-    fn fight(&mut self, index: usize, target: usize, chance: &mut Chance) {
-        let field = self.field.clone();
-        let Some((own, other, strike)) = self.pairing(&field, index, target) else {
-            return;
-        };
+    fn fight(&mut self, field: &Battlefield, index: usize, target: usize, chance: &mut Chance) {
+        let own = &field.profiles[usize::from(self.state.units[index].kind)];
+        let other = &field.profiles[usize::from(self.state.units[target].kind)];
+        let Some(strike) = &own.strike else { return };
         let square = self.state.distance_squared(index, target);
         let unit = &mut self.state.units[index];
         if let Some(swing) = unit.swing {
@@ -120,17 +121,6 @@ impl Battle {
             let to = [self.state.x[target], self.state.y[target]];
             self.set_out(index, to);
         }
-    }
-
-    fn pairing<'a>(
-        &self,
-        field: &'a crate::skirmish::rules::Battlefield,
-        index: usize,
-        target: usize,
-    ) -> Option<(&'a Profile, &'a Profile, &'a Strike)> {
-        let own = &field.profiles[usize::from(self.state.units[index].kind)];
-        let other = &field.profiles[usize::from(self.state.units[target].kind)];
-        own.strike.as_ref().map(|strike| (own, other, strike))
     }
 
     /// Advances an attack to `elapsed` loops since its start; at the damage point it takes effect and spends the period.

@@ -11,6 +11,7 @@ mod battle;
 mod chance;
 mod combat;
 mod movement;
+mod neighbours;
 mod opponent;
 mod placement;
 mod profile;
@@ -21,3 +22,6 @@ pub use chance::Chance;
 pub use placement::spread_around;
 pub use profile::{Battlefield, Profile, Strike};
 pub use state::{BattleState, Blow, Missile, Order, Stance, Team, Unit, UnitIndex};
+
+#[cfg(test)]
+mod tests;

@@ -5,11 +5,13 @@
 //! The engine's own steering is not known; what a player would recognise is kept: walkers push idle friends aside, nobody
 //! pushes a unit that is attacking, enemies block each other, and units slide round obstacles instead of stopping.
 
-use crate::skirmish::rules::{Battle, Team};
+use crate::skirmish::rules::Battle;
 
 /// How firmly a unit stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Footing {
+    /// Dead: in nobody's way.
+    Gone,
     /// On the move.
     Walking,
     /// Idle: walking friends push it aside.
@@ -18,158 +20,116 @@ pub(super) enum Footing {
     Braced,
 }
 
-/// Living units in compact arrays, which the loops over pairs run through.
+/// Where units are about to be, and how they are pushed.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Neighbours {
-    x: Vec<f32>,
-    y: Vec<f32>,
-    radius: Vec<f32>,
-    footing: Vec<Footing>,
-    team: Vec<Team>,
-    index: Vec<usize>,
+pub(super) struct Steps {
+    pub(super) x: Vec<f32>,
+    pub(super) y: Vec<f32>,
     push_x: Vec<f32>,
     push_y: Vec<f32>,
 }
 
+/// A walker's wish: the unit vector to its destination and the distance.
+#[derive(Debug, Clone, Copy)]
+struct Wish {
+    ahead: [f32; 2],
+    distance: f32,
+}
+
 /// Gap to an obstacle, in map units, at which a walker begins to step round it.
-const LOOKAHEAD: f32 = 0.5;
+pub(super) const LOOKAHEAD: f32 = 0.5;
 /// Loops for which a walker keeps the side on which it steps round.
 const DETOUR_LOOPS: u8 = 8;
 /// Rounds of pushing apart in a loop, at most.
 const PUSH_ROUNDS: usize = 3;
+/// Map units that a round pushes a unit along an axis, at most.
+const GREATEST_PUSH: f32 = 0.07;
 /// Overlap in map units that is left alone.
 const OVERLAP_TOLERANCE: f32 = 1e-3;
 
-impl Neighbours {
-    pub(super) fn reserve(&mut self, units: usize) {
-        self.clear();
-        self.x.reserve(units);
-        self.y.reserve(units);
-        self.radius.reserve(units);
-        self.footing.reserve(units);
-        self.team.reserve(units);
-        self.index.reserve(units);
-        self.push_x.reserve(units);
-        self.push_y.reserve(units);
-    }
-
-    fn clear(&mut self) {
-        self.x.clear();
-        self.y.clear();
-        self.radius.clear();
-        self.footing.clear();
-        self.team.clear();
-        self.index.clear();
-    }
-
-    fn len(&self) -> usize {
-        self.index.len()
-    }
-
-    /// Whether `other` is in the way of a walker of `team`: it will not move aside.
-    fn blocks(&self, other: usize, team: Team) -> bool {
-        match self.footing[other] {
-            Footing::Braced => true,
-            Footing::Standing => self.team[other] != team,
-            Footing::Walking => false,
-        }
+impl Steps {
+    pub(super) fn resize(&mut self, units: usize) {
+        self.x.resize(units, 0.0);
+        self.y.resize(units, 0.0);
+        self.push_x.resize(units, 0.0);
+        self.push_y.resize(units, 0.0);
     }
 }
 
 impl Battle {
     /// Moves every walker by one loop and resolves what overlaps.
     pub(super) fn walk(&mut self) {
-        self.gather();
-        self.step_forward();
+        self.scratch.neighbours.refresh(&self.field, &self.state);
+        self.scratch.steps.x.copy_from_slice(&self.state.x);
+        self.scratch.steps.y.copy_from_slice(&self.state.y);
+        for index in 0..self.state.units.len() {
+            if let Some(to) = self.scratch.destination[index] {
+                self.step_forward(index, to);
+            }
+        }
         for _ in 0..PUSH_ROUNDS {
-            if !push_apart(&mut self.scratch.neighbours) {
+            if !self.push_apart() {
                 break;
             }
         }
         self.settle();
     }
 
-    fn gather(&mut self) {
-        let neighbours = &mut self.scratch.neighbours;
-        neighbours.clear();
-        for (index, unit) in self.state.units.iter().enumerate() {
-            if unit.life > 0.0 {
-                neighbours.x.push(self.state.x[index]);
-                neighbours.y.push(self.state.y[index]);
-                let profile = &self.field.profiles[usize::from(unit.kind)];
-                neighbours.radius.push(profile.separation_radius);
-                neighbours.footing.push(self.scratch.footing[index]);
-                neighbours.team.push(unit.team);
-                neighbours.index.push(index);
-            }
+    /// One walker's step, computed from the positions at the loop's beginning.
+    fn step_forward(&mut self, index: usize, [to_x, to_y]: [f32; 2]) {
+        let (x, y) = (self.state.x[index], self.state.y[index]);
+        let (dx, dy) = (to_x - x, to_y - y);
+        let distance = (dx * dx + dy * dy).sqrt();
+        if distance == 0.0 {
+            return;
         }
+        let speed = self.field.profiles[usize::from(self.state.units[index].kind)].speed;
+        let stride = speed.min(distance);
+        let ahead = [dx / distance, dy / distance];
+        let [way_x, way_y] = self.way_round(index, Wish { ahead, distance });
+        self.scratch.steps.x[index] = x + way_x * stride;
+        self.scratch.steps.y[index] = y + way_y * stride;
     }
 
-    /// Steps of all walkers, computed from the positions in `state` and written to the neighbours' positions.
-    fn step_forward(&mut self) {
-        for slot in 0..self.scratch.neighbours.len() {
-            let index = self.scratch.neighbours.index[slot];
-            let Some([to_x, to_y]) = self.scratch.destination[index] else {
-                continue;
-            };
-            let (x, y) = (self.state.x[index], self.state.y[index]);
-            let (dx, dy) = (to_x - x, to_y - y);
-            let distance = (dx * dx + dy * dy).sqrt();
-            if distance == 0.0 {
-                continue;
-            }
-            let speed = self.field.profiles[usize::from(self.state.units[index].kind)].speed;
-            let stride = speed.min(distance);
-            let ahead = [dx / distance, dy / distance];
-            let [way_x, way_y] = self.way_round(slot, index, ahead, distance);
-            self.scratch.neighbours.x[slot] = x + way_x * stride;
-            self.scratch.neighbours.y[slot] = y + way_y * stride;
-        }
-    }
-
-    /// The unit vector along which a walker goes that wants to go `ahead`: the same if nothing blocks it, else the tangent,
-    /// on the side that it is passing, of the obstacle that turns it the most.
-    fn way_round(&mut self, slot: usize, index: usize, ahead: [f32; 2], distance: f32) -> [f32; 2] {
-        let neighbours = &self.scratch.neighbours;
-        let (xs, ys) = (&self.state.x, &self.state.y);
-        let own = (xs[index], ys[index]);
-        let (radius, team) = (neighbours.radius[slot], neighbours.team[slot]);
-        let unit = &mut self.state.units[index];
+    /// The unit vector along which a walker goes: towards its destination if nothing blocks it, else the tangent, on the side
+    /// that it is passing, of the obstacle that turns it the most.
+    fn way_round(&mut self, index: usize, wish: Wish) -> [f32; 2] {
+        let (state, neighbours) = (&mut self.state, &self.scratch.neighbours);
+        let (x, y) = (state.x[index], state.y[index]);
+        let unit = &mut state.units[index];
         unit.detour_loops = unit.detour_loops.saturating_sub(1);
         let mut side = if unit.detour_loops > 0 {
             f32::from(unit.detour)
         } else {
             0.0
         };
-        let mut way = ahead;
+        let mut way = wish.ahead;
         let mut turned = 1.0;
-        for other in 0..neighbours.len() {
-            if other == slot || !neighbours.blocks(other, team) {
+        for &other in neighbours.of(index) {
+            let other = usize::from(other);
+            if !blocks(
+                self.scratch.footing[other],
+                neighbours.are_friends(index, other),
+            ) {
                 continue;
             }
-            let there = neighbours.index[other];
-            let (px, py) = (xs[there] - own.0, ys[there] - own.1);
-            let touch = radius + neighbours.radius[other];
-            let square = px * px + py * py;
-            let near = touch + LOOKAHEAD;
-            let forward = px * ahead[0] + py * ahead[1];
-            let across = ahead[0] * py - ahead[1] * px;
-            let is_destination = forward >= distance - 1e-3 && across.abs() < 1e-3;
-            if square >= near * near || forward <= 0.0 || across.abs() >= touch || is_destination {
+            let toward = [state.x[other] - x, state.y[other] - y];
+            let Some(across) = wish.obstructed(toward, neighbours.touch(index, other)) else {
                 continue;
-            }
+            };
             if side == 0.0 {
-                // Pass on the side where less of the obstacle is; straight ahead, towards greater y.
+                // Pass on the side where less of the obstacle is; if it is straight ahead, towards greater y.
                 let left = if across == 0.0 {
-                    ahead[0] >= 0.0
+                    wish.ahead[0] >= 0.0
                 } else {
                     across < 0.0
                 };
                 side = if left { 1.0 } else { -1.0 };
             }
+            let square = toward[0] * toward[0] + toward[1] * toward[1];
             let scale = side / square.max(1e-12).sqrt();
-            let tangent = [-py * scale, px * scale];
-            let along = tangent[0] * ahead[0] + tangent[1] * ahead[1];
+            let tangent = [-toward[1] * scale, toward[0] * scale];
+            let along = tangent[0] * wish.ahead[0] + tangent[1] * wish.ahead[1];
             if along < turned {
                 (way, turned) = (tangent, along);
             }
@@ -181,17 +141,53 @@ impl Battle {
         way
     }
 
-    /// Takes the new positions over, off the walls. A walker that a wall stops passes its obstacle on the other side.
-    fn settle(&mut self) {
-        let neighbours = &self.scratch.neighbours;
-        for slot in 0..neighbours.len() {
-            let index = neighbours.index[slot];
-            let unit = &mut self.state.units[index];
-            let profile = &self.field.profiles[usize::from(unit.kind)];
-            let (new_x, new_y) = (neighbours.x[slot], neighbours.y[slot]);
-            if (new_x, new_y) == (self.state.x[index], self.state.y[index]) {
+    /// Pushes overlapping units apart once; returns whether any overlapped.
+    fn push_apart(&mut self) -> bool {
+        let (neighbours, steps) = (&self.scratch.neighbours, &mut self.scratch.steps);
+        let footing = &self.scratch.footing;
+        let mut overlapped = false;
+        for i in 0..footing.len() {
+            if footing[i] == Footing::Gone {
                 continue;
             }
+            let (x, y) = (steps.x[i], steps.y[i]);
+            for &j in neighbours.after(i) {
+                let j = usize::from(j);
+                let (dx, dy) = (steps.x[j] - x, steps.y[j] - y);
+                let touch = neighbours.touch(i, j);
+                let square = dx * dx + dy * dy;
+                let slack = touch - OVERLAP_TOLERANCE;
+                if square < slack * slack && footing[j] != Footing::Gone {
+                    if !overlapped {
+                        steps.push_x.fill(0.0);
+                        steps.push_y.fill(0.0);
+                        overlapped = true;
+                    }
+                    let shares = shares(footing[i], footing[j], neighbours.are_friends(i, j));
+                    steps.share_out([i, j], [dx, dy], touch - square.sqrt(), shares);
+                }
+            }
+        }
+        if overlapped {
+            for (position, push) in steps.x.iter_mut().zip(&steps.push_x) {
+                *position += push.clamp(-GREATEST_PUSH, GREATEST_PUSH);
+            }
+            for (position, push) in steps.y.iter_mut().zip(&steps.push_y) {
+                *position += push.clamp(-GREATEST_PUSH, GREATEST_PUSH);
+            }
+        }
+        overlapped
+    }
+
+    /// Takes the new positions over, off the walls. A walker that a wall stops passes its obstacle on the other side.
+    fn settle(&mut self) {
+        let state = &mut self.state;
+        for (index, unit) in state.units.iter_mut().enumerate() {
+            let (new_x, new_y) = (self.scratch.steps.x[index], self.scratch.steps.y[index]);
+            if new_x == state.x[index] && new_y == state.y[index] {
+                continue;
+            }
+            let profile = &self.field.profiles[usize::from(unit.kind)];
             let (x, y) = self
                 .field
                 .terrain
@@ -201,72 +197,76 @@ impl Battle {
                 unit.detour = -unit.detour;
                 unit.detour_loops = 2 * DETOUR_LOOPS;
             }
-            (self.state.x[index], self.state.y[index]) = (x, y);
+            (state.x[index], state.y[index]) = (x, y);
         }
     }
 }
 
-/// Pushes overlapping units apart once; returns whether any overlapped.
-fn push_apart(neighbours: &mut Neighbours) -> bool {
-    let count = neighbours.len();
-    let mut overlapped = false;
-    for i in 0..count {
-        let (x, y, radius) = (neighbours.x[i], neighbours.y[i], neighbours.radius[i]);
-        for j in i + 1..count {
-            let (dx, dy) = (neighbours.x[j] - x, neighbours.y[j] - y);
-            let touch = radius + neighbours.radius[j];
-            let square = dx * dx + dy * dy;
-            if square < touch * touch {
-                if !overlapped {
-                    neighbours.push_x.clear();
-                    neighbours.push_x.resize(count, 0.0);
-                    neighbours.push_y.clear();
-                    neighbours.push_y.resize(count, 0.0);
-                    overlapped = true;
-                }
-                share_out(neighbours, i, j, [dx, dy, square.sqrt(), touch]);
-            }
-        }
+impl Wish {
+    /// Whether an obstacle that lies `toward` and is touched at distance `touch` is in the way; if so, how far it lies to the
+    /// left (negative: to the right) of the straight way.
+    fn obstructed(&self, toward: [f32; 2], touch: f32) -> Option<f32> {
+        let [px, py] = toward;
+        let forward = px * self.ahead[0] + py * self.ahead[1];
+        let across = self.ahead[0] * py - self.ahead[1] * px;
+        let near = touch + LOOKAHEAD;
+        let is_destination = forward >= self.distance - 1e-3 && across.abs() < 1e-3;
+        let is_in_the_way = forward > 0.0
+            && across.abs() < touch
+            && px * px + py * py < near * near
+            && !is_destination;
+        is_in_the_way.then_some(across)
     }
-    if overlapped {
-        for i in 0..count {
-            neighbours.x[i] += neighbours.push_x[i];
-            neighbours.y[i] += neighbours.push_y[i];
-        }
-    }
-    overlapped
 }
 
-/// Adds what the overlap of `i` and `j` moves each.
-fn share_out(neighbours: &mut Neighbours, i: usize, j: usize, [dx, dy, distance, touch]: [f32; 4]) {
-    let overlap = touch - distance;
-    if overlap < OVERLAP_TOLERANCE {
-        return;
+impl Steps {
+    /// Adds what an overlap moves each of two units.
+    fn share_out(
+        &mut self,
+        [i, j]: [usize; 2],
+        [dx, dy]: [f32; 2],
+        overlap: f32,
+        [share_i, share_j]: [f32; 2],
+    ) {
+        let distance = (dx * dx + dy * dy).sqrt();
+        // Units on the very same spot part along y.
+        let (ux, uy) = if distance > 1e-6 {
+            (dx / distance, dy / distance)
+        } else {
+            (0.0, 1.0)
+        };
+        self.push_x[i] -= ux * overlap * share_i;
+        self.push_y[i] -= uy * overlap * share_i;
+        self.push_x[j] += ux * overlap * share_j;
+        self.push_y[j] += uy * overlap * share_j;
     }
-    let (weight_i, weight_j) = (give_way(neighbours, i, j), give_way(neighbours, j, i));
+}
+
+/// Whether a unit will not move aside for a walker.
+fn blocks(footing: Footing, are_friends: bool) -> bool {
+    match footing {
+        Footing::Braced => true,
+        Footing::Standing => !are_friends,
+        Footing::Walking | Footing::Gone => false,
+    }
+}
+
+/// Which parts of an overlap two units give way by; they sum to 1.
+fn shares(i: Footing, j: Footing, are_friends: bool) -> [f32; 2] {
+    let (weight_i, weight_j) = (readiness(i, are_friends), readiness(j, are_friends));
     let total = weight_i + weight_j;
-    let (share_i, share_j) = if total > 0.0 {
-        (weight_i / total, weight_j / total)
+    if total > 0.0 {
+        [weight_i / total, weight_j / total]
     } else {
-        (0.5, 0.5)
-    };
-    // Units on the very same spot part along y.
-    let (ux, uy) = if distance > 1e-6 {
-        (dx / distance, dy / distance)
-    } else {
-        (0.0, 1.0)
-    };
-    neighbours.push_x[i] -= ux * overlap * share_i;
-    neighbours.push_y[i] -= uy * overlap * share_i;
-    neighbours.push_x[j] += ux * overlap * share_j;
-    neighbours.push_y[j] += uy * overlap * share_j;
+        [0.5, 0.5]
+    }
 }
 
-/// How readily `unit` gives way to `other`: walkers do, idle units do to friends, attackers do not.
-fn give_way(neighbours: &Neighbours, unit: usize, other: usize) -> f32 {
-    match neighbours.footing[unit] {
+/// How readily a unit gives way: walkers do, idle units do to friends, attackers do not.
+fn readiness(footing: Footing, are_friends: bool) -> f32 {
+    match footing {
         Footing::Walking => 1.0,
-        Footing::Standing if neighbours.team[unit] == neighbours.team[other] => 0.5,
-        Footing::Standing | Footing::Braced => 0.0,
+        Footing::Standing if are_friends => 0.5,
+        Footing::Standing | Footing::Braced | Footing::Gone => 0.0,
     }
 }

@@ -1,0 +1,188 @@
+//! Whole episodes: what holds in every step of them, and how scripted teams fare.
+
+use mackrl_env::{
+    Action, Environment, EpisodeEnd, EpisodeKey, Observations, Stream, registry,
+    skirmish::{Compatibility, Skirmish, SkirmishSettings, scripted::ScriptedPolicy},
+};
+
+/// Plays an episode; `watch` is called after the start and after every step with the reward.
+fn play(
+    skirmish: &mut Skirmish,
+    policy: ScriptedPolicy,
+    episode: u64,
+    mut watch: impl FnMut(&Skirmish, &Observations, f32),
+) -> EpisodeEnd {
+    let spec = skirmish.spec().clone();
+    let prior = skirmish.prior_knowledge();
+    let mut observations = Observations::new(&spec, 1);
+    let mut actions = vec![Action::default(); spec.agents];
+    let key = EpisodeKey::new(5, Stream::Other, episode);
+    skirmish.reset(key, &mut observations.row_mut(0));
+    watch(skirmish, &observations, 0.0);
+    for step in 0..spec.episode_limit {
+        policy.act(
+            &spec,
+            prior.as_ref(),
+            &observations,
+            0,
+            (key, step),
+            &mut actions,
+        );
+        let time_step = skirmish
+            .step(&actions, &mut observations.row_mut(0))
+            .expect("scripted policies choose available actions");
+        watch(skirmish, &observations, time_step.reward);
+        if let Some(end) = time_step.end {
+            return end;
+        }
+    }
+    panic!("an episode ends at its limit");
+}
+
+fn make(name: &str, settings: &SkirmishSettings) -> Skirmish {
+    registry::make_skirmish(name, settings).expect("the map is shipped")
+}
+
+/// Battles won of `episodes`, and the mean return.
+fn fare(name: &str, policy: ScriptedPolicy, episodes: u64) -> (u64, f64) {
+    let mut skirmish = make(name, &SkirmishSettings::default());
+    let (mut won, mut total) = (0, 0.0);
+    for episode in 0..episodes {
+        play(&mut skirmish, policy, episode, |_, _, reward| {
+            total += f64::from(reward)
+        });
+        won += u64::from(skirmish.statistics().battle_won);
+    }
+    (won, total / episodes as f64)
+}
+
+#[test]
+fn on_3m_shooting_together_wins_and_standing_or_stumbling_loses() {
+    let (focused, focused_return) = fare("3m", ScriptedPolicy::FocusFire, 100);
+    let (idle, idle_return) = fare("3m", ScriptedPolicy::Idle, 100);
+    let (random, random_return) = fare("3m", ScriptedPolicy::Random, 100);
+    assert!(focused >= 90, "focused fire won {focused} of 100");
+    assert!(random <= 5, "random actions won {random} of 100");
+    assert_eq!((idle, idle_return), (0, 0.0), "nobody shot");
+    assert!(
+        focused_return > random_return,
+        "{focused_return} against {random_return}"
+    );
+}
+
+#[test]
+fn a_won_game_of_3m_returns_20() {
+    for compat in [Compatibility::Smac, Compatibility::Clean] {
+        let settings = SkirmishSettings {
+            compat,
+            ..SkirmishSettings::default()
+        };
+        let mut skirmish = make("3m", &settings);
+        let mut wins = 0;
+        for episode in 0..20 {
+            let mut total = 0.0;
+            play(
+                &mut skirmish,
+                ScriptedPolicy::FocusFire,
+                episode,
+                |_, _, reward| total += reward,
+            );
+            if skirmish.statistics().battle_won {
+                wins += 1;
+                assert!((total - 20.0).abs() < 1e-4, "a return of {total}");
+            }
+        }
+        assert!(wins > 0, "no game was won, so nothing was shown");
+    }
+}
+
+#[test]
+fn nothing_impossible_happens_in_any_step_on_any_map() {
+    for name in registry::names() {
+        let Ok(mut skirmish) = registry::make_skirmish(name, &SkirmishSettings::default()) else {
+            continue;
+        };
+        for (episode, policy) in ScriptedPolicy::ALL.into_iter().enumerate() {
+            let mut was_alive = vec![true; skirmish.spec().entities];
+            play(&mut skirmish, policy, episode as u64, |skirmish, _, _| {
+                check_bodies(skirmish, &mut was_alive);
+            });
+        }
+    }
+}
+
+/// Life and shields in range, the dead stay dead, everybody off the walls.
+fn check_bodies(skirmish: &Skirmish, was_alive: &mut [bool]) {
+    let (state, field) = (skirmish.battle().state(), skirmish.battle().field());
+    let name = &skirmish.spec().name;
+    for (index, unit) in state.units.iter().enumerate() {
+        let profile = &field.profiles[usize::from(unit.kind)];
+        assert!(
+            (0.0..=profile.life).contains(&unit.life),
+            "{name}: life {}",
+            unit.life
+        );
+        assert!(
+            (0.0..=profile.shield).contains(&unit.shield),
+            "{name}: shield {}",
+            unit.shield
+        );
+        assert!(
+            was_alive[index] || !unit.is_alive(),
+            "{name}: unit {index} rose from the dead"
+        );
+        was_alive[index] = unit.is_alive();
+        let (x, y) = (state.x[index], state.y[index]);
+        let (free_x, free_y) = field
+            .terrain
+            .pushed_out_of_walls(x, y, profile.inner_radius - 0.01);
+        assert!(
+            (free_x - x).abs() + (free_y - y).abs() < 1e-4,
+            "{name}: unit {index} is in a wall at {x}, {y}"
+        );
+    }
+}
+
+#[test]
+fn episodes_of_one_key_are_the_same_in_every_step_and_others_differ() {
+    for name in ["3m", "2s3z"] {
+        let hashes = |episode| {
+            let mut hashes = Vec::new();
+            let mut skirmish = make(name, &SkirmishSettings::default());
+            play(
+                &mut skirmish,
+                ScriptedPolicy::Nearest,
+                episode,
+                |skirmish, _, _| {
+                    hashes.push(skirmish.state_hash());
+                },
+            );
+            hashes
+        };
+        assert_eq!(hashes(1), hashes(1), "{name}");
+        assert_ne!(
+            hashes(1),
+            hashes(2),
+            "{name}: the cooldown jitter makes episodes differ"
+        );
+    }
+}
+
+#[test]
+fn an_episode_does_not_depend_on_those_before_it() {
+    let mut used = make("2s3z", &SkirmishSettings::default());
+    play(&mut used, ScriptedPolicy::Random, 0, |_, _, _| {});
+    let mut observed = [Vec::new(), Vec::new()];
+    for (skirmish, observed) in [used, make("2s3z", &SkirmishSettings::default())]
+        .iter_mut()
+        .zip(&mut observed)
+    {
+        play(skirmish, ScriptedPolicy::Random, 9, |_, observations, _| {
+            observed.push(observations.clone());
+        });
+    }
+    assert!(
+        observed[0] == observed[1],
+        "the second episode remembers the first"
+    );
+}
