@@ -301,7 +301,7 @@ mod tests {
         let (distribution, p, episodes) = (ObservationDistribution::NeurIps2019, 0.6, 20_000);
         let mut dealt = Vec::new();
         deal(game(distribution, p), episodes, |game, _| {
-            dealt.push(game.cards())
+            dealt.push(game.cards());
         });
         for expected in distribution.deals(p).unwrap() {
             let count = dealt

@@ -1,0 +1,315 @@
+//! The paper's claims about Figure 5, each with the rule by which it is judged.
+//!
+//! Learners at one point start from the same logits, run by run, so differences between them are means of paired
+//! differences with their own standard error. "Equal" needs evidence as much as "greater" does: it means that the whole
+//! interval of two standard errors lies within [`EQUAL`] of zero, so a noisy experiment cannot prove equality.
+
+use mackrl::tabular::{Curve, Learner, Optima, Sweep};
+use mackrl_env::matrix_game::ObservationDistribution;
+
+use super::report::{Claim, ClaimSource, Delegation, Published, Quantity};
+
+/// Differences up to this count as none; the game's returns lie in [0, 1].
+const EQUAL: f64 = 0.02;
+/// Standard errors on either side of a mean that are believed.
+const ERRORS: f64 = 2.0;
+/// Rounding of sums of a few hundred products.
+const ROUNDING: f64 = 1e-12;
+
+/// All that verdicts are made from.
+pub(super) struct Findings<'a> {
+    pub(super) distribution: ObservationDistribution,
+    pub(super) points: &'a [f64],
+    pub(super) sweep: &'a Sweep,
+    pub(super) optima: &'a [Optima],
+    pub(super) published: Published,
+    pub(super) delegation: Delegation,
+}
+
+/// Judges every claim.
+pub(super) fn claims(findings: &Findings<'_>) -> Vec<Claim> {
+    vec![
+        reproduces_independent_learning(findings),
+        joint_learning_ignores_private_observations(findings),
+        matches_joint_learning(findings),
+        outperforms_both(findings),
+        delegates_without_common_knowledge(findings),
+        is_optimal(findings),
+        published_points_are_met(findings),
+        optima_are_as_derived(findings),
+    ]
+}
+
+fn reproduces_independent_learning(findings: &Findings<'_>) -> Claim {
+    let (holds, difference) = findings.equal(Learner::Mackrl, Learner::Iac, 0);
+    let best = findings.optima[0];
+    let published = findings.published_pair(Learner::Mackrl, Learner::Iac, 0.0);
+    Claim {
+        claim: "Without common knowledge (p = 0), MACKRL reproduces the performance of independent actors".into(),
+        source: ClaimSource::Paper,
+        holds,
+        evidence: format!(
+            "MACKRL − IAC = {difference}; equal means within ±{EQUAL} of 0 by {ERRORS} standard errors. {published} The best \
+             policies of both classes earn the same ({:.3} and {:.3}), so the gap is one of learning: with the pair \
+             controller in play the agents are trained only as far as it delegates.",
+            best.mackrl, best.decentralised
+        ),
+    }
+}
+
+fn joint_learning_ignores_private_observations(findings: &Findings<'_>) -> Claim {
+    let jal = findings.curve(Learner::Jal);
+    let shortfall = (findings.optima.iter().zip(&jal.mean))
+        .map(|(best, mean)| best.jal - mean)
+        .fold(0.0, f64::max);
+    let (ahead, difference) = findings.greater(Learner::Iac, Learner::Jal, 0);
+    let best = findings.optima[0];
+    Claim {
+        claim:
+            "Without common knowledge, joint-action learning fails to use the private observations"
+                .into(),
+        source: ClaimSource::Paper,
+        holds: ahead && shortfall < EQUAL && best.jal < best.decentralised,
+        evidence: format!(
+            "At p = 0 JAL earns {:.3}, and no policy on common knowledge alone earns more than {:.3}; private observations \
+             are worth up to {:.3}. IAC − JAL = {difference}. JAL learns what it can: it ends at most {shortfall:.3} below \
+             its optimum at every p.",
+            jal.mean[0], best.jal, best.decentralised
+        ),
+    }
+}
+
+fn matches_joint_learning(findings: &Findings<'_>) -> Claim {
+    let last = findings.points.len() - 1;
+    let (holds, difference) = findings.equal(Learner::Mackrl, Learner::Jal, last);
+    let published = findings.published_pair(Learner::Mackrl, Learner::Jal, 1.0);
+    Claim {
+        claim: "With common knowledge always available (p = 1), MACKRL matches JAL".into(),
+        source: ClaimSource::Paper,
+        holds,
+        evidence: format!(
+            "MACKRL − JAL = {difference}; equal means within ±{EQUAL} of 0. {published}"
+        ),
+    }
+}
+
+fn outperforms_both(findings: &Findings<'_>) -> Claim {
+    let between: Vec<usize> = (0..findings.points.len())
+        .filter(|&point| findings.points[point] > 0.0 && findings.points[point] < 1.0)
+        .collect();
+    let margins = |rival| {
+        let list: Vec<String> = (between.iter())
+            .map(|&point| {
+                let (ahead, difference) = findings.greater(Learner::Mackrl, rival, point);
+                let mark = if ahead { "" } else { " (not ahead)" };
+                format!("{:.1}: {difference}{mark}", findings.points[point])
+            })
+            .collect();
+        list.join(", ")
+    };
+    let ahead = |rival, &point: &usize| findings.greater(Learner::Mackrl, rival, point).0;
+    let rivals = [Learner::Iac, Learner::Jal];
+    let wins = (between.iter())
+        .filter(|point| rivals.iter().all(|&rival| ahead(rival, point)))
+        .count();
+    Claim {
+        claim: "At intermediate probabilities (0 < p < 1), MACKRL outperforms both IAC and JAL"
+            .into(),
+        source: ClaimSource::Paper,
+        holds: wins == between.len(),
+        evidence: format!(
+            "It is ahead of both by more than {ERRORS} standard errors at {wins} of {} points. MACKRL − IAC at {}. MACKRL − \
+             JAL at {}.",
+            between.len(),
+            margins(Learner::Iac),
+            margins(Learner::Jal)
+        ),
+    }
+}
+
+fn delegates_without_common_knowledge(findings: &Findings<'_>) -> Claim {
+    let delegation = &findings.delegation;
+    let range = |values: &[&Vec<Option<f64>>]| {
+        let known = values.iter().flat_map(|values| values.iter().flatten());
+        known.fold([1.0_f64, 0.0_f64], |[low, high], &value| {
+            [low.min(value), high.max(value)]
+        })
+    };
+    let off = range(&[&delegation.nothing.mean]);
+    let on = range(&[&delegation.matrix_a.mean, &delegation.matrix_b.mean]);
+    Claim {
+        claim: "MACKRL learns to delegate whenever the common-knowledge bit is absent and to act jointly when it is present"
+            .into(),
+        source: ClaimSource::Paper,
+        holds: off[0] > 0.5 && on[1] < 0.5,
+        evidence: format!(
+            "Mean probability of delegation, where the state occurs: {:.3} to {:.3} with the bit off, {:.3} to {:.3} with it \
+             on, over all p. The rule asks for more than half with the bit off and less than half with it on.",
+            off[0], off[1], on[0], on[1]
+        ),
+    }
+}
+
+fn is_optimal(findings: &Findings<'_>) -> Claim {
+    let curve = findings.curve(Learner::Mackrl);
+    let gap = |point: usize| findings.optima[point].mackrl - curve.mean[point];
+    let met: Vec<String> = (0..findings.points.len())
+        .filter(|&point| gap(point) <= EQUAL)
+        .map(|point| format!("{:.1}", findings.points[point]))
+        .collect();
+    let widest = (0..findings.points.len())
+        .max_by(|&left, &right| gap(left).total_cmp(&gap(right)))
+        .unwrap_or(0);
+    Claim {
+        claim: "What MACKRL learns corresponds to the optimal policy".into(),
+        source: ClaimSource::Paper,
+        holds: met.len() == findings.points.len(),
+        evidence: format!(
+            "An optimal policy delegates when the bit is off and may act jointly when it is on, and that pattern is learned; \
+             the actions behind it often are not optimal. The mean return is within {EQUAL} of the optimum at {} of {} points \
+             ({}), and furthest from it at p = {:.1}: {:.3} of {:.3}.",
+            met.len(),
+            findings.points.len(),
+            if met.is_empty() {
+                "none".into()
+            } else {
+                format!("p = {}", met.join(", "))
+            },
+            findings.points[widest],
+            curve.mean[widest],
+            findings.optima[widest].mackrl
+        ),
+    }
+}
+
+fn published_points_are_met(findings: &Findings<'_>) -> Claim {
+    let mut compared = 0;
+    let mut missed = Vec::new();
+    let mut furthest = (0.0_f64, String::new());
+    for learner in Learner::ALL {
+        let ours = findings.curve(learner);
+        for (point, &p) in findings.points.iter().enumerate() {
+            let Some(published) = findings.published.at(learner, p) else {
+                continue;
+            };
+            compared += 1;
+            let (mean, sem) = (ours.mean[point], ours.sem[point]);
+            let distance = (mean - published).abs();
+            let place = format!(
+                "{} at p = {p:.1}: {mean:.3} ± {sem:.3}, published {published:.3}",
+                name(learner)
+            );
+            if distance > EQUAL {
+                missed.push(place.clone());
+            }
+            if distance > furthest.0 {
+                furthest = (distance, place);
+            }
+        }
+    }
+    let missed = match missed.len() {
+        0 => String::new(),
+        count => format!(
+            " Further than that: {count} points ({}).",
+            missed.join("; ")
+        ),
+    };
+    Claim {
+        claim: format!("Every published point lies within {EQUAL} of ours"),
+        source: ClaimSource::Reproduction,
+        holds: missed.is_empty(),
+        evidence: format!(
+            "{compared} points of {}. The largest difference is {:.3}, {}.{missed}",
+            findings.published.source, furthest.0, furthest.1
+        ),
+    }
+}
+
+fn optima_are_as_derived(findings: &Findings<'_>) -> Claim {
+    let (formulae, derived): (&str, fn(f64) -> [Option<f64>; 2]) = match findings.distribution {
+        ObservationDistribution::Y2018 => (
+            "0.5 + 0.5p for JAL and 0.75 + 0.25p for IAC and MACKRL",
+            |p| [Some(0.5 + 0.5 * p), Some(0.75 + 0.25 * p)],
+        ),
+        ObservationDistribution::NeurIps2019 => (
+            "0.5 + 0.375p for JAL, and the same for IAC as for MACKRL",
+            |p| [Some(0.5 + 0.375 * p), None],
+        ),
+    };
+    let error = (findings.points.iter().zip(findings.optima))
+        .map(|(&p, best)| {
+            let [jal, mackrl] = derived(p);
+            let of_jal = jal.map_or(0.0, |jal| (best.jal - jal).abs());
+            let of_mackrl = mackrl.map_or(0.0, |mackrl| (best.mackrl - mackrl).abs());
+            of_jal
+                .max(of_mackrl)
+                .max((best.mackrl - best.decentralised).abs())
+        })
+        .fold(0.0, f64::max);
+    Claim {
+        claim: format!("The best returns are exactly {formulae}"),
+        source: ClaimSource::Reproduction,
+        holds: error < ROUNDING,
+        evidence: format!(
+            "Enumeration of all deterministic policies at {} points; largest difference {error:.1e}. Whatever MACKRL gains \
+             over IAC is gained in learning: it can express nothing better.",
+            findings.points.len()
+        ),
+    }
+}
+
+impl Findings<'_> {
+    const fn quantity(&self) -> Quantity {
+        self.published.quantity
+    }
+
+    fn curve(&self, learner: Learner) -> Curve {
+        let quantity = self.quantity();
+        self.sweep.curve(learner, |run| quantity.of(run))
+    }
+
+    /// Mean and standard error of `first` − `second` at `point`.
+    fn difference(&self, first: Learner, second: Learner, point: usize) -> (f64, f64) {
+        let quantity = self.quantity();
+        let curve = self.sweep.difference(first, second, |run| quantity.of(run));
+        (curve.mean[point], curve.sem[point])
+    }
+
+    /// Whether `first` equals `second` at `point`, and their difference in words.
+    fn equal(&self, first: Learner, second: Learner, point: usize) -> (bool, String) {
+        let (mean, sem) = self.difference(first, second, point);
+        (mean.abs() + ERRORS * sem <= EQUAL, in_words(mean, sem))
+    }
+
+    /// Whether `first` is above `second` at `point`, and their difference in words.
+    fn greater(&self, first: Learner, second: Learner, point: usize) -> (bool, String) {
+        let (mean, sem) = self.difference(first, second, point);
+        (mean > ERRORS * sem + ROUNDING, in_words(mean, sem))
+    }
+
+    /// What was published for both learners at `p`.
+    fn published_pair(&self, first: Learner, second: Learner, p: f64) -> String {
+        let pair = (self.published.at(first, p)).zip(self.published.at(second, p));
+        pair.map_or_else(String::new, |(above, below)| {
+            let difference = signed(above - below);
+            format!("Published: {above:.3} against {below:.3}, {difference}.")
+        })
+    }
+}
+
+/// The name that people know a learner by.
+pub(super) const fn name(learner: Learner) -> &'static str {
+    match learner {
+        Learner::Iac => "IAC",
+        Learner::Jal => "JAL",
+        Learner::Mackrl => "MACKRL",
+    }
+}
+
+fn in_words(mean: f64, sem: f64) -> String {
+    format!("{} ± {sem:.3}", signed(mean))
+}
+
+fn signed(value: f64) -> String {
+    format!("{value:+.3}").replace('-', "−")
+}
