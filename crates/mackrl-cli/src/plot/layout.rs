@@ -15,7 +15,7 @@ const SUBTITLE_SIZE: f64 = 12.0;
 const LABEL_SIZE: f64 = 13.0;
 const TICK_SIZE: f64 = 12.0;
 const LEGEND_ROW: f64 = 19.0;
-const SAMPLE_WIDTH: f64 = 26.0;
+const SAMPLE_WIDTH: f64 = 25.0;
 const LINE_WIDTH: f64 = 2.25;
 const DASHES_WIDTH: f64 = 1.25;
 const RING_RADIUS: f64 = 3.4;
@@ -37,7 +37,7 @@ struct Axes {
 /// Lays `chart` out.
 pub(super) fn lay_out(chart: &LineChart) -> Scene {
     let x = scale(chart.x_axis.range, chart, 6.0, |point| [point.x; 2]);
-    let y = scale(chart.y_axis.range, chart, 6.0, |point| {
+    let y = scale(chart.y_axis.range, chart, 7.0, |point| {
         [point.y - point.half_width, point.y + point.half_width]
     });
     let plot_area = plot_area(chart, &y);
@@ -222,13 +222,17 @@ fn legend(chart: &LineChart, area: Rectangle) -> Vec<Shape> {
     let paper = Rectangle {
         left,
         top,
-        right: left + width,
+        right: match chart.legend {
+            Corner::UpperLeft | Corner::LowerLeft => left + width,
+            // To the edge, lest stubs of grid lines stick out behind the legend.
+            Corner::UpperRight | Corner::LowerRight => area.right,
+        },
         bottom: top + height,
     };
     let mut shapes = vec![Shape::Polygon {
         points: paper.corners().to_vec(),
         colour: WHITE,
-        opacity: 0.85,
+        opacity: 0.9,
     }];
     for (row, (series, name)) in rows.into_iter().enumerate() {
         let middle = top + 5.0 + (row as f64 + 0.5) * LEGEND_ROW;

@@ -17,3 +17,6 @@ mod svg;
 mod text;
 
 pub(crate) use chart::{Axis, Colour, Corner, LineChart, Mark, Point, Series};
+
+#[cfg(test)]
+mod tests;

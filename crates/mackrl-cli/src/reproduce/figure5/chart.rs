@@ -9,8 +9,8 @@ use crate::plot::{Axis, Colour, Corner, LineChart, Mark, Point, Series};
 /// The chart of `report`.
 pub(super) fn chart(report: &Figure5Report) -> LineChart {
     let payoffs = match report.payoffs {
-        Payoffs::Coded => "payoffs of the published code",
-        Payoffs::Printed => "payoffs as printed",
+        Payoffs::Coded => "Payoffs of the published code",
+        Payoffs::Printed => "Payoffs as printed",
     };
     let observation = match report.observation {
         ObservationDistribution::Y2018 => "observations as in 2018",
@@ -21,18 +21,18 @@ pub(super) fn chart(report: &Figure5Report) -> LineChart {
         Quantity::Test => "Expected return of the greedy policy",
     };
     LineChart {
-        title: "Matrix game".into(),
+        title: "Matrix game: return by probability of common knowledge".into(),
         subtitle: format!(
             "{payoffs}, {observation}; mean of {} runs, band ± one standard error",
             report.runs
         ),
         x_axis: Axis {
             label: "P(common knowledge)".into(),
-            range: Some([0.0, 1.0]),
+            range: Some([-0.02, 1.02]),
         },
         y_axis: Axis {
             label: quantity.into(),
-            range: Some([0.4, 1.0]),
+            range: Some([0.4, 1.02]),
         },
         series: all_series(report),
         legend: Corner::LowerRight,

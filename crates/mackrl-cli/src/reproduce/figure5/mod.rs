@@ -16,12 +16,11 @@ use std::{fs, path::Path};
 use anyhow::Context as _;
 use mackrl::tabular::{Learner, SweepSettings, TabularGame, optima, sweep};
 
-pub(crate) use options::{Figure5Options, ObservationOption, PayoffsOption};
-pub(crate) use report::{
-    Claim, Curves, Delegation, Figure5Report, OptimumCurves, Published, Quantity, StateDelegation,
-};
+pub(crate) use options::Figure5Options;
+pub(crate) use report::Figure5Report;
 
 use claims::Findings;
+use report::Delegation;
 
 /// Probabilities of common knowledge, as published.
 fn points() -> Vec<f64> {

@@ -112,6 +112,9 @@ pub(crate) struct Delegation {
     pub(crate) matrix_a: StateDelegation,
     /// The bit is on and the matrix is B.
     pub(crate) matrix_b: StateDelegation,
+    /// Share of runs that delegate with probability above 1/2 when the bit is off and below 1/2 when it is on, in the states
+    /// that occur.
+    pub(crate) runs_as_described: Vec<f64>,
 }
 
 /// Probability of delegation in one state; `None` at points where the state never occurs, so that nothing is learned in it.
@@ -227,15 +230,26 @@ impl Delegation {
         distribution: ObservationDistribution,
         points: &[f64],
     ) -> Self {
+        let occurs = |state: CommonKnowledge, p: f64| match state {
+            CommonKnowledge::Nothing => distribution.probability_of_bit(p) < 1.0,
+            CommonKnowledge::MatrixA | CommonKnowledge::MatrixB => p > 0.0,
+        };
+        let as_described = |run: &Run, p: f64| {
+            CommonKnowledge::ALL.into_iter().all(|state| {
+                let delegates = run.delegation[state.index()] > 0.5;
+                !occurs(state, p) || delegates == (state == CommonKnowledge::Nothing)
+            })
+        };
+        let share = |(point, &p): (usize, &f64)| {
+            let runs = sweep.runs(Learner::Mackrl, point);
+            let count = runs.iter().filter(|run| as_described(run, p)).count();
+            count as f64 / runs.len() as f64
+        };
         let state = |state: CommonKnowledge| {
             let curve = sweep.curve(Learner::Mackrl, |run| run.delegation[state.index()]);
-            let occurs = |p: f64| match state {
-                CommonKnowledge::Nothing => distribution.probability_of_bit(p) < 1.0,
-                CommonKnowledge::MatrixA | CommonKnowledge::MatrixB => p > 0.0,
-            };
             let known = |values: Vec<f64>| {
                 (values.into_iter().zip(points))
-                    .map(|(value, &p)| occurs(p).then_some(value))
+                    .map(|(value, &p)| occurs(state, p).then_some(value))
                     .collect()
             };
             StateDelegation {
@@ -247,6 +261,7 @@ impl Delegation {
             nothing: state(CommonKnowledge::Nothing),
             matrix_a: state(CommonKnowledge::MatrixA),
             matrix_b: state(CommonKnowledge::MatrixB),
+            runs_as_described: points.iter().enumerate().map(share).collect(),
         }
     }
 }

@@ -2,13 +2,12 @@
 
 use std::fmt::{Display, Formatter, Result};
 
-use mackrl::tabular::Curve;
+use mackrl::tabular::{Curve, Learner};
 
 use super::{
     claims::name,
     report::{Claim, ClaimSource, Figure5Report, Quantity, StateDelegation},
 };
-use mackrl::tabular::Learner;
 
 /// Columns of a terminal that evidence is broken to.
 const COLUMNS: usize = 100;
@@ -70,7 +69,7 @@ impl Figure5Report {
         )?;
         writeln!(
             out,
-            "{:>4}   {:>8}   {:>8}   {:>8}",
+            "{:>4}   {:>8}   {:>8}   {:>8}   runs as described",
             "p", "nothing", "matrix A", "matrix B"
         )?;
         let states = &self.delegation;
@@ -81,7 +80,11 @@ impl Figure5Report {
                 of(&states.matrix_a),
                 of(&states.matrix_b),
             );
-            writeln!(out, "{p:>4.1}   {nothing:>8}   {a:>8}   {b:>8}")?;
+            let share = 100.0 * states.runs_as_described[point];
+            writeln!(
+                out,
+                "{p:>4.1}   {nothing:>8}   {a:>8}   {b:>8}   {share:>15.0} %"
+            )?;
         }
         writeln!(out)
     }

@@ -2,7 +2,7 @@ use std::num::NonZeroUsize;
 
 use clap::Parser;
 
-use super::*;
+use super::{report::Claim, *};
 
 #[derive(Parser)]
 struct CommandLine {
@@ -95,7 +95,8 @@ fn verdicts_are_those_that_the_numbers_support() {
             true,
         ),
         ("With common knowledge always available", true),
-        ("MACKRL learns to delegate", true),
+        ("On average, MACKRL delegates", true),
+        ("It does so whenever", false),
         (
             "What MACKRL learns corresponds to the optimal policy",
             false,
