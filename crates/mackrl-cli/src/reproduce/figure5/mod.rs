@@ -6,6 +6,7 @@
 
 mod chart;
 mod claims;
+mod findings;
 mod options;
 mod published;
 mod report;
@@ -19,7 +20,7 @@ use mackrl::tabular::{Learner, SweepSettings, TabularGame, optima, sweep};
 pub(crate) use options::Figure5Options;
 pub(crate) use report::Figure5Report;
 
-use claims::Findings;
+use findings::Findings;
 use report::Delegation;
 
 /// Probabilities of common knowledge, as published.

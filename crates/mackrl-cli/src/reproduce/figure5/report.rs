@@ -4,10 +4,7 @@ use mackrl::tabular::{Curve, Learner, Optima, Run, Sweep};
 use mackrl_env::matrix_game::{CommonKnowledge, ObservationDistribution, Payoffs};
 use serde::{Deserialize, Serialize};
 
-use super::{
-    claims::{Findings, claims},
-    options::Figure5Options,
-};
+use super::{claims::claims, findings::Findings, options::Figure5Options};
 
 /// Figure 5 in numbers.
 ///

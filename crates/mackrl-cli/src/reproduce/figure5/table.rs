@@ -5,7 +5,7 @@ use std::fmt::{Display, Formatter, Result};
 use mackrl::tabular::{Curve, Learner};
 
 use super::{
-    claims::name,
+    findings::name,
     report::{Claim, ClaimSource, Figure5Report, Quantity, StateDelegation},
 };
 
@@ -100,7 +100,12 @@ fn write_claim(claim: &Claim, out: &mut Formatter<'_>) -> Result {
         ClaimSource::Paper => "paper",
         ClaimSource::Reproduction => "ours ",
     };
-    writeln!(out, "  {verdict}  {source}  {}", claim.claim)?;
+    let mut heading = format!("  {verdict}  {source}  ");
+    let indent = " ".repeat(heading.chars().count());
+    for line in wrapped(&claim.claim, COLUMNS - indent.len()) {
+        writeln!(out, "{heading}{line}")?;
+        heading.clone_from(&indent);
+    }
     for line in wrapped(&claim.evidence, COLUMNS - 6) {
         writeln!(out, "      {line}")?;
     }
