@@ -1,15 +1,17 @@
 //! The `mackrl` program: train, evaluate, certify and reproduce.
 //!
-//! This crate holds no algorithm. `args` is what was typed, `commands` what it means, `run_folder` what a run leaves on
-//! disk, `progress` what a person sees while waiting, `failure` the one place that turns errors into exit codes. Data go
-//! to stdout, everything else to stderr.
+//! This crate holds no algorithm. `args` is what was typed, `commands` what it means, `reproduce` one command for each figure
+//! of the paper, `plot` the drawing of its results, `run_folder` what a run leaves on disk, `progress` what a person sees
+//! while waiting, `failure` the one place that turns errors into exit codes. Data go to stdout, everything else to stderr.
 
 mod args;
 mod commands;
 mod failure;
 mod output;
+mod plot;
 #[cfg_attr(not(test), expect(dead_code, reason = "training is wired next"))]
 mod progress;
+mod reproduce;
 #[cfg_attr(not(test), expect(dead_code, reason = "training is wired next"))]
 mod run_folder;
 
@@ -21,6 +23,7 @@ use crate::args::{Cli, Command};
 
 fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
+        Command::Reproduce(args) => commands::reproduce::run(&args),
         Command::Maps(args) => commands::maps::run(&args),
         Command::Config(args) => commands::config::run(&args),
         Command::Bench(args) => commands::bench::run(&args),

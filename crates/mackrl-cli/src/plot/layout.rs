@@ -1,0 +1,282 @@
+//! Where everything stands: from a chart to a scene.
+
+use super::{
+    chart::{Colour, Corner, LineChart, Mark, Point, Series},
+    scale::Scale,
+    scene::{Anchor, Direction, Rectangle, Scene, Shape, Weight, Words},
+    text,
+};
+
+const WIDTH: u16 = 720;
+const HEIGHT: u16 = 480;
+const MARGIN: f64 = 20.0;
+const TITLE_SIZE: f64 = 17.0;
+const SUBTITLE_SIZE: f64 = 12.0;
+const LABEL_SIZE: f64 = 13.0;
+const TICK_SIZE: f64 = 12.0;
+const LEGEND_ROW: f64 = 19.0;
+const SAMPLE_WIDTH: f64 = 25.0;
+const LINE_WIDTH: f64 = 2.25;
+const DASHES_WIDTH: f64 = 1.25;
+const RING_RADIUS: f64 = 3.4;
+const BAND_OPACITY: f64 = 0.18;
+/// Share of a font's size by which a base line lies below the middle of its lower-case letters.
+const MIDDLE: f64 = 0.35;
+
+const WHITE: Colour = Colour(0xFF, 0xFF, 0xFF);
+const INK: Colour = Colour(0x22, 0x22, 0x22);
+const FAINT_INK: Colour = Colour(0x5A, 0x5A, 0x5A);
+const GRID: Colour = Colour(0xE4, 0xE4, 0xE4);
+
+/// Both axes in pixels.
+struct Axes {
+    x: Scale,
+    y: Scale,
+}
+
+/// Lays `chart` out.
+pub(super) fn lay_out(chart: &LineChart) -> Scene {
+    let x = scale(chart.x_axis.range, chart, 6.0, |point| [point.x; 2]);
+    let y = scale(chart.y_axis.range, chart, 7.0, |point| {
+        [point.y - point.half_width, point.y + point.half_width]
+    });
+    let plot_area = plot_area(chart, &y);
+    let axes = Axes {
+        x: x.onto(plot_area.left, plot_area.right),
+        y: y.onto(plot_area.bottom, plot_area.top),
+    };
+    let mut foreground = axis_words(chart, plot_area, &axes);
+    foreground.extend(titles(chart, plot_area));
+    foreground.extend(legend(chart, plot_area));
+    Scene {
+        width: WIDTH,
+        height: HEIGHT,
+        plot_area,
+        background: grid(plot_area, &axes),
+        data: data(chart, &axes),
+        foreground,
+    }
+}
+
+fn scale(
+    range: Option<[f64; 2]>,
+    chart: &LineChart,
+    ticks: f64,
+    extent: impl Fn(&Point) -> [f64; 2],
+) -> Scale {
+    let points = chart.series.iter().flat_map(|series| &series.points);
+    range.map_or_else(
+        || Scale::fitting(points.flat_map(extent), ticks),
+        |range| Scale::new(range, ticks),
+    )
+}
+
+fn plot_area(chart: &LineChart, y: &Scale) -> Rectangle {
+    let widest = (y.ticks().iter())
+        .map(|(_, label)| text::width(label, TICK_SIZE, Weight::Regular))
+        .fold(0.0, f64::max);
+    let subtitle = if chart.subtitle.is_empty() { 0.0 } else { 19.0 };
+    Rectangle {
+        left: MARGIN + LABEL_SIZE + 12.0 + widest + 8.0,
+        top: MARGIN + TITLE_SIZE + 12.0 + subtitle,
+        right: f64::from(WIDTH) - MARGIN - 8.0,
+        bottom: f64::from(HEIGHT) - MARGIN - LABEL_SIZE - 12.0 - TICK_SIZE - 6.0,
+    }
+}
+
+fn grid(area: Rectangle, axes: &Axes) -> Vec<Shape> {
+    let line = |points, colour| Shape::Line {
+        points,
+        colour,
+        width: 1.0,
+        dashed: false,
+    };
+    let mut shapes: Vec<Shape> = (axes.y.ticks().into_iter())
+        .map(|(value, _)| {
+            let y = axes.y.place(value);
+            line(vec![[area.left, y], [area.right, y]], GRID)
+        })
+        .collect();
+    shapes.extend(axes.x.ticks().into_iter().map(|(value, _)| {
+        let x = axes.x.place(value);
+        line(vec![[x, area.bottom], [x, area.bottom + 5.0]], FAINT_INK)
+    }));
+    shapes.push(line(
+        vec![[area.left, area.bottom], [area.right, area.bottom]],
+        FAINT_INK,
+    ));
+    shapes
+}
+
+fn axis_words(chart: &LineChart, area: Rectangle, axes: &Axes) -> Vec<Shape> {
+    let tick = |text: String, at: [f64; 2], anchor| {
+        Shape::Words(Words {
+            anchor,
+            ..words(text, at, TICK_SIZE, FAINT_INK)
+        })
+    };
+    let mut shapes = Vec::new();
+    for (value, label) in axes.x.ticks() {
+        let at = [axes.x.place(value), area.bottom + TICK_SIZE + 8.0];
+        shapes.push(tick(label, at, Anchor::Middle));
+    }
+    for (value, label) in axes.y.ticks() {
+        let at = [area.left - 8.0, axes.y.place(value) + MIDDLE * TICK_SIZE];
+        shapes.push(tick(label, at, Anchor::End));
+    }
+    let below = [
+        f64::midpoint(area.left, area.right),
+        f64::from(HEIGHT) - MARGIN,
+    ];
+    shapes.push(Shape::Words(Words {
+        anchor: Anchor::Middle,
+        ..words(chart.x_axis.label.clone(), below, LABEL_SIZE, INK)
+    }));
+    let beside = [MARGIN + LABEL_SIZE, f64::midpoint(area.top, area.bottom)];
+    shapes.push(Shape::Words(Words {
+        anchor: Anchor::Middle,
+        direction: Direction::Upwards,
+        ..words(chart.y_axis.label.clone(), beside, LABEL_SIZE, INK)
+    }));
+    shapes
+}
+
+fn titles(chart: &LineChart, area: Rectangle) -> Vec<Shape> {
+    let base = MARGIN + TITLE_SIZE * 0.8;
+    let title = Words {
+        weight: Weight::Medium,
+        ..words(chart.title.clone(), [area.left, base], TITLE_SIZE, INK)
+    };
+    let at = [area.left, base + 19.0];
+    let subtitle = words(chart.subtitle.clone(), at, SUBTITLE_SIZE, FAINT_INK);
+    vec![Shape::Words(title), Shape::Words(subtitle)]
+}
+
+fn data(chart: &LineChart, axes: &Axes) -> Vec<Shape> {
+    let bands = chart.series.iter().filter_map(|series| band(series, axes));
+    let marks = chart.series.iter().flat_map(|series| {
+        let places = (series.points.iter())
+            .map(|point| [axes.x.place(point.x), axes.y.place(point.y)])
+            .collect();
+        marks(series, places)
+    });
+    bands.chain(marks).collect()
+}
+
+fn band(series: &Series, axes: &Axes) -> Option<Shape> {
+    let edge = |sign: f64| {
+        (series.points.iter()).map(move |point| {
+            let y = point.y + sign * point.half_width;
+            [axes.x.place(point.x), axes.y.place(y)]
+        })
+    };
+    let wide = series.points.iter().any(|point| point.half_width > 0.0);
+    wide.then(|| Shape::Polygon {
+        points: edge(1.0).chain(edge(-1.0).rev()).collect(),
+        colour: series.colour,
+        opacity: BAND_OPACITY,
+    })
+}
+
+fn marks(series: &Series, places: Vec<[f64; 2]>) -> Vec<Shape> {
+    let colour = series.colour;
+    let line = |width, dashed| Shape::Line {
+        points: places.clone(),
+        colour,
+        width,
+        dashed,
+    };
+    match series.mark {
+        Mark::Line => vec![line(LINE_WIDTH, false)],
+        Mark::Dashes => vec![line(DASHES_WIDTH, true)],
+        Mark::Rings => (places.iter())
+            .map(|&centre| Shape::Ring {
+                centre,
+                radius: RING_RADIUS,
+                colour,
+                width: 1.4,
+            })
+            .collect(),
+    }
+}
+
+fn legend(chart: &LineChart, area: Rectangle) -> Vec<Shape> {
+    let rows: Vec<(&Series, &str)> = (chart.series.iter())
+        .filter_map(|series| series.name.as_deref().map(|name| (series, name)))
+        .collect();
+    let widest = (rows.iter())
+        .map(|(_, name)| text::width(name, TICK_SIZE, Weight::Regular))
+        .fold(0.0, f64::max);
+    let (width, height) = (
+        SAMPLE_WIDTH + 8.0 + widest + 20.0,
+        rows.len() as f64 * LEGEND_ROW + 10.0,
+    );
+    let left = match chart.legend {
+        Corner::UpperLeft | Corner::LowerLeft => area.left + 10.0,
+        Corner::UpperRight | Corner::LowerRight => area.right - 6.0 - width,
+    };
+    let top = match chart.legend {
+        Corner::UpperLeft | Corner::UpperRight => area.top + 6.0,
+        Corner::LowerLeft | Corner::LowerRight => area.bottom - 10.0 - height,
+    };
+    let paper = Rectangle {
+        left,
+        top,
+        right: match chart.legend {
+            Corner::UpperLeft | Corner::LowerLeft => left + width,
+            // To the edge, lest stubs of grid lines stick out behind the legend.
+            Corner::UpperRight | Corner::LowerRight => area.right,
+        },
+        bottom: top + height,
+    };
+    let mut shapes = vec![Shape::Polygon {
+        points: paper.corners().to_vec(),
+        colour: WHITE,
+        opacity: 0.9,
+    }];
+    for (row, (series, name)) in rows.into_iter().enumerate() {
+        let middle = top + 5.0 + (row as f64 + 0.5) * LEGEND_ROW;
+        let start = left + 10.0;
+        shapes.extend(sample(series, start, middle));
+        let at = [start + SAMPLE_WIDTH + 8.0, middle + MIDDLE * TICK_SIZE];
+        shapes.push(Shape::Words(words(name.into(), at, TICK_SIZE, INK)));
+    }
+    shapes
+}
+
+/// What a series looks like, beside its name.
+fn sample(series: &Series, start: f64, middle: f64) -> Vec<Shape> {
+    let end = start + SAMPLE_WIDTH;
+    let places = match series.mark {
+        Mark::Line | Mark::Dashes => vec![[start, middle], [end, middle]],
+        Mark::Rings => vec![[f64::midpoint(start, end), middle]],
+    };
+    let mut shapes = Vec::new();
+    if series.points.iter().any(|point| point.half_width > 0.0) {
+        let area = Rectangle {
+            left: start,
+            top: middle - 5.0,
+            right: end,
+            bottom: middle + 5.0,
+        };
+        shapes.push(Shape::Polygon {
+            points: area.corners().to_vec(),
+            colour: series.colour,
+            opacity: BAND_OPACITY,
+        });
+    }
+    shapes.extend(marks(series, places));
+    shapes
+}
+
+const fn words(text: String, at: [f64; 2], size: f64, colour: Colour) -> Words {
+    Words {
+        text,
+        at,
+        anchor: Anchor::Start,
+        size,
+        weight: Weight::Regular,
+        colour,
+        direction: Direction::Rightwards,
+    }
+}

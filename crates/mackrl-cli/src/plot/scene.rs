@@ -1,0 +1,108 @@
+//! What both writers draw: shapes in units of an SVG pixel, the origin at the top left.
+
+use super::chart::Colour;
+
+/// A picture.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Scene {
+    /// Width of the picture.
+    pub(super) width: u16,
+    /// Height of the picture.
+    pub(super) height: u16,
+    /// Where data may be drawn.
+    pub(super) plot_area: Rectangle,
+    /// Grid and frame, drawn first.
+    pub(super) background: Vec<Shape>,
+    /// Data, clipped to the plot area.
+    pub(super) data: Vec<Shape>,
+    /// Words and the legend, drawn last.
+    pub(super) foreground: Vec<Shape>,
+}
+
+/// An upright rectangle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Rectangle {
+    pub(super) left: f64,
+    pub(super) top: f64,
+    pub(super) right: f64,
+    pub(super) bottom: f64,
+}
+
+impl Rectangle {
+    /// The corners, clockwise.
+    pub(super) const fn corners(self) -> [[f64; 2]; 4] {
+        let Self {
+            left,
+            top,
+            right,
+            bottom,
+        } = self;
+        [[left, top], [right, top], [right, bottom], [left, bottom]]
+    }
+}
+
+/// A thing to draw.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Shape {
+    /// A filled polygon.
+    Polygon {
+        points: Vec<[f64; 2]>,
+        colour: Colour,
+        opacity: f64,
+    },
+    /// An open line.
+    Line {
+        points: Vec<[f64; 2]>,
+        colour: Colour,
+        width: f64,
+        dashed: bool,
+    },
+    /// A white disc with a coloured edge.
+    Ring {
+        centre: [f64; 2],
+        radius: f64,
+        colour: Colour,
+        width: f64,
+    },
+    /// Words on one line.
+    Words(Words),
+}
+
+/// Words on one line.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Words {
+    pub(super) text: String,
+    /// The end or middle of the base line, as `anchor` says.
+    pub(super) at: [f64; 2],
+    pub(super) anchor: Anchor,
+    /// Height of an em.
+    pub(super) size: f64,
+    pub(super) weight: Weight,
+    pub(super) colour: Colour,
+    pub(super) direction: Direction,
+}
+
+/// Which part of the words stands at their place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Anchor {
+    Start,
+    Middle,
+    End,
+}
+
+/// Where words run to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Direction {
+    Rightwards,
+    Upwards,
+}
+
+/// Weight of a font.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Weight {
+    Regular,
+    Medium,
+}
+
+/// Dash and gap of dashed lines.
+pub(super) const DASHES: [f32; 2] = [5.0, 3.5];

@@ -1,0 +1,125 @@
+//! Writes a scene as SVG. Words stay words, so that they can be searched, copied and restyled.
+
+use std::fmt::Write;
+
+use super::{
+    chart::Colour,
+    scene::{Anchor, DASHES, Direction, Scene, Shape, Weight, Words},
+};
+
+/// The document; `title` is what screen readers say.
+pub(super) fn write(scene: &Scene, title: &str) -> String {
+    let (width, height) = (scene.width, scene.height);
+    let area = scene.plot_area;
+    let mut out = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
+         viewBox=\"0 0 {width} {height}\" role=\"img\" \
+         font-family=\"Roboto, 'Helvetica Neue', Arial, sans-serif\">\n\
+         <title>{}</title>\n\
+         <defs><clipPath id=\"plot-area\"><rect x=\"{:.2}\" y=\"{:.2}\" width=\"{:.2}\" height=\"{:.2}\"/></clipPath></defs>\n\
+         <rect width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/>\n",
+        escape(title),
+        area.left,
+        area.top,
+        area.right - area.left,
+        area.bottom - area.top,
+    );
+    for (group, shapes) in [
+        ("<g>", &scene.background),
+        ("<g clip-path=\"url(#plot-area)\">", &scene.data),
+        ("<g>", &scene.foreground),
+    ] {
+        out.push_str(group);
+        out.push('\n');
+        shapes
+            .iter()
+            .for_each(|shape| out.push_str(&element(shape)));
+        out.push_str("</g>\n");
+    }
+    out.push_str("</svg>\n");
+    out
+}
+
+fn element(shape: &Shape) -> String {
+    match shape {
+        Shape::Polygon {
+            points,
+            colour,
+            opacity,
+        } => format!(
+            "<polygon points=\"{}\" fill=\"{}\" fill-opacity=\"{opacity}\"/>\n",
+            coordinates(points),
+            hexadecimal(*colour),
+        ),
+        Shape::Line {
+            points,
+            colour,
+            width,
+            dashed,
+        } => {
+            let [dash, gap] = DASHES;
+            let dashes = if *dashed {
+                format!(" stroke-dasharray=\"{dash} {gap}\"")
+            } else {
+                String::new()
+            };
+            format!(
+                "<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{width}\" \
+                 stroke-linejoin=\"round\"{dashes}/>\n",
+                coordinates(points),
+                hexadecimal(*colour),
+            )
+        }
+        Shape::Ring {
+            centre: [x, y],
+            radius,
+            colour,
+            width,
+        } => format!(
+            "<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"{radius}\" fill=\"#ffffff\" stroke=\"{}\" \
+             stroke-width=\"{width}\"/>\n",
+            hexadecimal(*colour),
+        ),
+        Shape::Words(words) => text(words),
+    }
+}
+
+fn text(words: &Words) -> String {
+    let [x, y] = words.at;
+    let anchor = match words.anchor {
+        Anchor::Start => "",
+        Anchor::Middle => " text-anchor=\"middle\"",
+        Anchor::End => " text-anchor=\"end\"",
+    };
+    let weight = match words.weight {
+        Weight::Regular => "",
+        Weight::Medium => " font-weight=\"500\"",
+    };
+    let turn = match words.direction {
+        Direction::Rightwards => String::new(),
+        Direction::Upwards => format!(" transform=\"rotate(-90 {x:.2} {y:.2})\""),
+    };
+    format!(
+        "<text x=\"{x:.2}\" y=\"{y:.2}\" font-size=\"{}\" fill=\"{}\"{anchor}{weight}{turn}>{}</text>\n",
+        words.size,
+        hexadecimal(words.colour),
+        escape(&words.text),
+    )
+}
+
+fn coordinates(points: &[[f64; 2]]) -> String {
+    let mut out = String::new();
+    for (index, [x, y]) in points.iter().enumerate() {
+        let space = if index == 0 { "" } else { " " };
+        write!(out, "{space}{x:.2},{y:.2}").expect("writing to a string cannot fail");
+    }
+    out
+}
+
+fn hexadecimal(Colour(red, green, blue): Colour) -> String {
+    format!("#{red:02x}{green:02x}{blue:02x}")
+}
+
+fn escape(text: &str) -> String {
+    (text.replace('&', "&amp;").replace('<', "&lt;")).replace('>', "&gt;")
+}

@@ -1,0 +1,94 @@
+//! `mackrl reproduce figure5`: the matrix game.
+//!
+//! Trains the three tabular learners at eleven probabilities of common knowledge, sets the result beside the published curve
+//! and the exact optima, and judges every claim that the paper makes about the figure. A verdict follows from a rule that is
+//! written beside the claim, not from the look of a curve, and it is printed whether or not it pleases.
+
+mod chart;
+mod claims;
+mod findings;
+mod options;
+mod published;
+mod report;
+mod table;
+
+use std::{fs, path::Path};
+
+use anyhow::Context as _;
+use mackrl::tabular::{Learner, SweepSettings, TabularGame, optima, sweep};
+
+pub(crate) use options::Figure5Options;
+pub(crate) use report::Figure5Report;
+
+use findings::Findings;
+use report::Delegation;
+
+/// Probabilities of common knowledge, as published.
+fn points() -> Vec<f64> {
+    (0..=10).map(|tenth| f64::from(tenth) / 10.0).collect()
+}
+
+/// Runs everything and writes `figure5.svg`, `figure5.png` and `figure5.json` into the folder that `options` names.
+///
+/// `progress` hears how many runs of how many are finished, from any thread. The files are the same bytes for any number of
+/// threads.
+///
+/// # Errors
+/// If a file cannot be written.
+pub(crate) fn run(
+    options: &Figure5Options,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> anyhow::Result<Figure5Report> {
+    // A folder that cannot be written should be found out before the work, not after it.
+    fs::create_dir_all(&options.out)
+        .with_context(|| format!("creating the folder {}", options.out.display()))?;
+    let report = compute(options, progress)?;
+    let chart = chart::chart(&report);
+    let json = serde_json::to_string_pretty(&report).context("writing the report as JSON")? + "\n";
+    write(&options.out, "figure5.json", json.as_bytes())?;
+    write(&options.out, "figure5.svg", chart.to_svg().as_bytes())?;
+    write(&options.out, "figure5.png", &chart.to_png()?)?;
+    Ok(report)
+}
+
+/// Runs everything and writes nothing.
+fn compute(
+    options: &Figure5Options,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> anyhow::Result<Figure5Report> {
+    let points = points();
+    let (payoffs, distribution) = (options.payoffs.into(), options.observation.into());
+    let settings = SweepSettings {
+        payoffs,
+        distribution,
+        points: points.clone(),
+        runs: options.runs,
+        seed: options.seed,
+        threads: options.threads(),
+    };
+    let total = Learner::ALL.len() * points.len() * options.runs;
+    let sweep = sweep(&settings, |done| progress(done, total))?;
+    let optima = (points.iter())
+        .map(|&p| Ok(optima(&TabularGame::new(payoffs, distribution, p)?)))
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    let findings = Findings {
+        distribution,
+        points: &points,
+        sweep: &sweep,
+        optima: &optima,
+        published: published::published(distribution),
+        delegation: Delegation::measured(&sweep, distribution, &points),
+    };
+    Ok(Figure5Report::new(options, findings))
+}
+
+/// Writes a file whole: a reader finds the old one or the new one, never a part.
+fn write(folder: &Path, name: &str, bytes: &[u8]) -> anyhow::Result<()> {
+    let path = folder.join(name);
+    let unfinished = folder.join(format!("{name}.tmp"));
+    fs::write(&unfinished, bytes).with_context(|| format!("writing {}", unfinished.display()))?;
+    fs::rename(&unfinished, &path).with_context(|| format!("writing {}", path.display()))
+}
+
+#[cfg(test)]
+mod tests;
