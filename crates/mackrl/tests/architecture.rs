@@ -23,7 +23,7 @@ struct Rule {
 }
 
 /// Documents of which every quoted path exists.
-const DOCUMENTS: [&str; 1] = ["ARCHITECTURE.md"];
+const DOCUMENTS: [&str; 2] = ["ARCHITECTURE.md", "PAPER.md"];
 
 /// What names things of the world and shows nothing of it.
 const NAMES: [&str; 9] = [
@@ -72,6 +72,24 @@ fn every_path_in_the_documents_exists() {
                 "{document} names {path}, which does not exist"
             );
         }
+    }
+}
+
+#[test]
+fn every_test_in_the_table_of_the_paper_exists() {
+    let text = fs::read_to_string(root().join("PAPER.md")).expect("PAPER.md exists");
+    let quoted: Vec<String> = text.lines().flat_map(quoted).collect();
+    let tests: Vec<_> = quoted
+        .iter()
+        .filter_map(|word| word.split_once("::"))
+        .collect();
+    assert!(tests.len() >= 6, "PAPER.md names a test for each equation");
+    for (file, test) in tests {
+        let code = fs::read_to_string(root().join(file)).unwrap_or_default();
+        assert!(
+            code.contains(&format!("fn {test}(")),
+            "PAPER.md names the test {test}, which {file} does not have"
+        );
     }
 }
 

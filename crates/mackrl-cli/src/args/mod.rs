@@ -6,8 +6,10 @@ mod runs;
 
 use clap::{Args, Parser, Subcommand};
 
+use crate::reproduce::figure5::Figure5Options;
 pub(crate) use bench::{BenchArgs, BenchCommand, BenchEnvironmentArgs};
 pub(crate) use configuration::ConfigurationArgs;
+
 pub(crate) use runs::{CertifyArgs, EvaluateArgs, TrainArgs};
 
 /// Teaches teams to coordinate without communicating, by acting jointly on what they commonly know.
@@ -26,9 +28,24 @@ pub(crate) struct Cli {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    Reproduce(ReproduceArgs),
     Maps(MapsArgs),
     Config(ConfigArgs),
     Bench(BenchArgs),
+}
+
+/// Reproduce a figure of the paper, and judge what the paper says about it
+///
+/// Example: mackrl reproduce figure5 --out runs/figure5
+#[derive(Debug, Args)]
+pub(crate) struct ReproduceArgs {
+    #[command(subcommand)]
+    pub(crate) figure: Figure,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Figure {
+    Figure5(Figure5Options),
 }
 
 /// List the maps that can be played, with the sizes of their arrays

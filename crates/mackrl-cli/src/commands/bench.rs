@@ -2,12 +2,12 @@
 
 use std::time::{Duration, Instant};
 
+use mackrl::config::ConfigBuilder;
 use mackrl_env::{Action, AgentId, Draw, Environment, EpisodeKey, Observations, Stream};
 use serde::Serialize;
 
 use crate::{
     args::{BenchArgs, BenchCommand, BenchEnvironmentArgs},
-    commands::maps,
     output,
 };
 
@@ -31,8 +31,11 @@ pub(crate) fn run(args: &BenchArgs) -> anyhow::Result<()> {
 }
 
 fn environment(args: &BenchEnvironmentArgs) -> anyhow::Result<()> {
-    let environment = maps::make(&args.map, &format!("--map {}", args.map))?;
-    let speed = measure(environment, args.steps.get())?;
+    let typed = format!("--map {}", args.map);
+    let config = ConfigBuilder::new()
+        .flag(&typed, &format!("env.map={}", args.map))?
+        .build()?;
+    let speed = measure(config.env.make()?, args.steps.get())?;
     if args.json {
         return output::print_json(&speed);
     }

@@ -14,7 +14,7 @@ pub(crate) fn run(args: &ConfigArgs) -> anyhow::Result<()> {
 fn with_origins(config: &Config, layers: &ConfigBuilder) -> String {
     let mut text = String::new();
     let mut section = String::new();
-    for key in keys(config) {
+    for key in Config::keys() {
         let Some((table, name)) = key.split_once('.') else {
             continue;
         };
@@ -37,17 +37,6 @@ fn with_origins(config: &Config, layers: &ConfigBuilder) -> String {
     text
 }
 
-/// Dotted keys of all settings, those of the map behind the map's name.
-fn keys(config: &Config) -> Vec<String> {
-    let declared = Config::settings().into_iter();
-    let (env, others): (Vec<_>, Vec<_>) = declared
-        .map(|setting| setting.key.to_owned())
-        .partition(|key| key.starts_with("env."));
-    let of_the_map = config.env.settings.keys();
-    let of_the_map = of_the_map.map(|name| format!("env.{name}"));
-    env.into_iter().chain(of_the_map).chain(others).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -57,7 +46,7 @@ mod tests {
         let layers = ConfigBuilder::new()
             .preset("paper-code")
             .unwrap()
-            .set("env.map=\"\"\"2s\n3z\"\"\"")
+            .flag("--map 2s3z\n", "env.map=2s3z")
             .unwrap();
         let config = layers.build().unwrap();
         let printed = with_origins(&config, &layers);

@@ -1,7 +1,7 @@
 //! `mackrl maps`: what can be played.
 
-use mackrl::config::{ConfigError, Origin};
-use mackrl_env::{Environment, EnvironmentSpec, registry};
+use anyhow::Context;
+use mackrl_env::{EnvironmentSpec, registry, skirmish::SkirmishSettings};
 use serde::Serialize;
 
 use crate::{args::MapsArgs, output};
@@ -33,24 +33,13 @@ impl From<&EnvironmentSpec> for MapRow {
 }
 
 pub(crate) fn run(args: &MapsArgs) -> anyhow::Result<()> {
-    let rows: Vec<MapRow> = registry::names()
-        .into_iter()
-        .filter_map(registry::make)
-        .map(|environment| MapRow::from(environment.spec()))
-        .collect();
+    let specs = registry::specs(&SkirmishSettings::default()).context("cannot list the maps")?;
+    let rows: Vec<MapRow> = specs.iter().map(MapRow::from).collect();
     if args.json {
         output::print_json(&rows)
     } else {
         output::print(&table(&rows))
     }
-}
-
-/// Builds the world called `name`, which `typed` asked for.
-pub(crate) fn make(name: &str, typed: &str) -> Result<Box<dyn Environment>, ConfigError> {
-    let origin = Origin::CommandLine {
-        text: typed.to_owned(),
-    };
-    registry::make(name).ok_or_else(|| ConfigError::unknown_map(origin, name, registry::names()))
 }
 
 fn table(rows: &[MapRow]) -> String {

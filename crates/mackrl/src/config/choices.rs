@@ -4,6 +4,8 @@ use std::{fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
 
+use crate::partition::PartitionSchedule;
+
 /// What learns.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -13,17 +15,6 @@ pub enum Algorithm {
     Mackrl,
     /// Central-V: the agent controllers alone, with the same central critic.
     CentralV,
-}
-
-/// Which features of commonly known entities a controller reads.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum CommonKnowledgeFeatures {
-    /// All features of every commonly known entity, as the paper's theory says.
-    #[default]
-    Complete,
-    /// Relative positions and availability of attacks, as the authors' code: no health, no shield, no unit type.
-    Thin,
 }
 
 /// How parameters follow the gradient.
@@ -48,6 +39,16 @@ pub enum PartitionChoice {
     RoundRobin,
     /// This many partitions (at least 1), drawn once from the shared seed and kept for the whole run.
     Sampled(usize),
+}
+
+impl From<PartitionChoice> for PartitionSchedule {
+    fn from(choice: PartitionChoice) -> Self {
+        match choice {
+            PartitionChoice::All => Self::All,
+            PartitionChoice::RoundRobin => Self::RoundRobin,
+            PartitionChoice::Sampled(count) => Self::Sampled { count },
+        }
+    }
 }
 
 impl fmt::Display for PartitionChoice {

@@ -19,17 +19,18 @@
 mod builder;
 mod choices;
 mod document;
+mod environment;
 mod error;
 mod presets;
 mod sections;
 mod settings;
 
 pub use builder::ConfigBuilder;
-pub use choices::{Algorithm, CommonKnowledgeFeatures, OptimiserKind, PartitionChoice};
+pub use choices::{Algorithm, OptimiserKind, PartitionChoice};
+pub use environment::EnvironmentConfig;
 pub use error::{ConfigError, Origin};
 pub use presets::{Preset, presets};
-pub use sections::{
-    Config, EnvironmentConfig, ExplorationConfig, LearnerConfig, PolicyConfig, RunConfig,
-    TestConfig,
-};
+pub use sections::{Config, ExplorationConfig, LearnerConfig, PolicyConfig, RunConfig, TestConfig};
 pub use settings::Setting;
+
+pub use crate::common_knowledge::CommonKnowledgeFeatures;

@@ -56,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_preset_loads_and_sets_every_setting() {
+    fn every_preset_loads_and_sets_every_setting_of_the_run() {
         for preset in presets() {
             let builder = ConfigBuilder::new().preset(preset.name).unwrap();
             builder.build().unwrap();

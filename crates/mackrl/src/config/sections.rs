@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::config::{
-    Algorithm, CommonKnowledgeFeatures, ConfigError, OptimiserKind, Origin, PartitionChoice,
-    Setting,
+    Algorithm, CommonKnowledgeFeatures, ConfigError, EnvironmentConfig, OptimiserKind, Origin,
+    PartitionChoice, Setting,
     settings::{Violation, section},
 };
 
@@ -24,47 +24,6 @@ pub struct Config {
     pub test: TestConfig,
     /// Length and seed.
     pub run: RunConfig,
-}
-
-/// The world that is played in.
-///
-/// Keys besides `map` are the world's own settings (`move_amount`, `sight_range`, ...). They stay an opaque table here and
-/// are checked by the world that reads them, so that this crate need not know every world's settings.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct EnvironmentConfig {
-    /// Name of the world in the registry, such as `3m`; `mackrl maps` lists them.
-    pub map: String,
-    /// Settings of the world that differ from its built-in ones.
-    #[serde(flatten)]
-    pub settings: toml::Table,
-}
-
-impl Default for EnvironmentConfig {
-    fn default() -> Self {
-        Self {
-            map: "3m".to_owned(),
-            settings: toml::Table::new(),
-        }
-    }
-}
-
-impl EnvironmentConfig {
-    const SETTINGS: &[Setting] = &[Setting {
-        key: "env.map",
-        documentation: "Name of the world in the registry, such as `3m`; `mackrl maps` lists them.",
-        expects: "a name that `mackrl maps` lists",
-    }];
-
-    fn violations(&self) -> Vec<Violation> {
-        let named = !self.map.is_empty();
-        let map = &Self::SETTINGS[0];
-        let violation = Violation {
-            key: map.key,
-            expects: map.expects,
-        };
-        if named { vec![] } else { vec![violation] }
-    }
 }
 
 section! {
@@ -141,7 +100,8 @@ section! {
 const EXACT: u64 = 1 << 53;
 
 impl Config {
-    /// Every setting with its meaning and its range, in the order of the file; worlds add their own below `env`.
+    /// Every setting of the run with its meaning and its range, in the order of the file; those of the map, below `env`, are
+    /// explained where the map's world declares them.
     #[must_use]
     pub fn settings() -> Vec<Setting> {
         [
@@ -155,10 +115,25 @@ impl Config {
         .concat()
     }
 
+    /// Every dotted key, in the order of the file.
+    ///
+    /// # Panics
+    /// Never: built-in settings are a table.
+    #[must_use]
+    pub fn keys() -> Vec<String> {
+        let declared = Self::settings().into_iter();
+        let (mut env, others): (Vec<_>, Vec<_>) = declared
+            .map(|setting| setting.key.to_owned())
+            .partition(|key| key.starts_with("env."));
+        env.extend(EnvironmentConfig::map_keys());
+        env.extend(others);
+        env
+    }
+
     /// Checks ranges and combinations.
     ///
     /// # Errors
-    /// [`ConfigError::WrongValue`] names the first setting that is out of its range.
+    /// [`ConfigError::UnknownMap`], or [`ConfigError::WrongValue`] with the first setting that is out of its range.
     pub fn validate(&self) -> Result<(), ConfigError> {
         self.validate_with(|_| Origin::Unknown)
     }
@@ -168,6 +143,7 @@ impl Config {
         &self,
         origin_of: impl Fn(&str) -> Origin,
     ) -> Result<(), ConfigError> {
+        self.env.validate_with(&origin_of)?;
         let Some(violation) = self.violations().into_iter().next() else {
             return Ok(());
         };
@@ -183,7 +159,6 @@ impl Config {
 
     fn violations(&self) -> Vec<Violation> {
         let mut violations = [
-            self.env.violations(),
             self.policy.violations(),
             self.exploration.violations(),
             self.learner.violations(),

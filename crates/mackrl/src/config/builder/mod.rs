@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 use crate::config::{
-    Config, ConfigError, Origin, Preset, Setting,
+    Config, ConfigError, Origin, Preset,
     document::{Leaf, SyntaxError, line_and_column, parse_assignment, parse_document},
     error::nearest,
 };
@@ -142,20 +142,24 @@ impl ConfigBuilder {
     /// Lays one value; the table stays deserialisable, so a failure is this value's.
     fn lay(&mut self, leaf: Leaf, key_at: Origin, value_at: Origin) -> Result<(), ConfigError> {
         let key = leaf.path.join(".");
-        let expected = expectation(&leaf.path).ok_or_else(|| ConfigError::UnknownKey {
-            origin: key_at,
-            nearest: nearest(&key, Config::settings().iter().map(|setting| setting.key)),
-            key: key.clone(),
-        })?;
+        let keys = Config::keys();
+        let section = format!("{key}.");
+        if !keys.contains(&key) && !keys.iter().any(|other| other.starts_with(&section)) {
+            return Err(ConfigError::UnknownKey {
+                origin: key_at,
+                nearest: nearest(&key, keys.iter().map(String::as_str)),
+                key,
+            });
+        }
         let found = leaf.value.to_string();
         let mut table = self.table.clone();
-        let laid = insert(&mut table, &leaf.path, leaf.value);
-        if !laid || Config::deserialize(table.clone()).is_err() {
+        insert(&mut table, &leaf.path, leaf.value);
+        if let Err(error) = Config::deserialize(table.clone()) {
             return Err(ConfigError::WrongValue {
                 origin: value_at,
+                expected: expectation(&key, error.message()),
                 key,
                 found,
-                expected: expected.to_owned(),
             });
         }
         self.table = table;
@@ -164,38 +168,37 @@ impl ConfigBuilder {
     }
 }
 
-/// What is expected at `path`; `None` if there is no such setting.
-fn expectation(path: &[String]) -> Option<&'static str> {
-    let key = path.join(".");
+/// What is expected at `key`, where a value failed to be read with `message`.
+fn expectation(key: &str, message: &str) -> String {
     let settings = Config::settings();
-    let is_section = |setting: &Setting| setting.key.starts_with(&format!("{key}."));
     if let Some(setting) = settings.iter().find(|setting| setting.key == key) {
-        Some(setting.expects)
-    } else if settings.iter().any(is_section) {
-        Some("a table of settings")
-    } else {
-        let [section, name] = path else { return None };
-        (section == "env" && !name.is_empty()).then_some("a setting of the map")
+        return setting.expects.to_owned();
+    }
+    match Config::default().get(key) {
+        Some(toml::Value::Float(_)) => "a number".to_owned(),
+        Some(toml::Value::Integer(_)) => "an integer in [0, 255]".to_owned(),
+        Some(toml::Value::Boolean(_)) => "`true` or `false`".to_owned(),
+        Some(toml::Value::Table(_)) => "a table of settings".to_owned(),
+        _ => match message.split_once("expected ") {
+            Some((_, expected)) => expected.to_owned(),
+            None => message.to_owned(),
+        },
     }
 }
 
-/// Puts `value` at `path`; false if something on the way is not a table.
-fn insert(table: &mut toml::Table, path: &[String], value: toml::Value) -> bool {
-    let Some((last, parents)) = path.split_last() else {
-        return false;
-    };
-    let mut table = table;
-    for name in parents {
-        let entry = table
-            .entry(name.clone())
-            .or_insert_with(|| toml::Value::Table(toml::Table::new()));
-        let Some(inner) = entry.as_table_mut() else {
-            return false;
-        };
-        table = inner;
+/// Puts `value` at `path`, of which all but the last name are tables: keys are checked first.
+fn insert(table: &mut toml::Table, path: &[String], value: toml::Value) {
+    match path {
+        [] => {}
+        [last] => {
+            table.insert(last.clone(), value);
+        }
+        [parent, below @ ..] => {
+            if let Some(inner) = table.get_mut(parent).and_then(toml::Value::as_table_mut) {
+                insert(inner, below, value);
+            }
+        }
     }
-    table.insert(last.clone(), value);
-    true
 }
 
 #[cfg(test)]

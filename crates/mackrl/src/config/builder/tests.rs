@@ -134,7 +134,37 @@ fn settings_of_the_map_reach_it() {
         .unwrap()
         .build()
         .unwrap();
-    assert_eq!(config.env.settings["move_amount"], toml::Value::Integer(5));
+    assert_eq!(config.env.settings.move_amount, 5.0);
+}
+
+#[test]
+fn a_setting_of_the_map_that_is_wrong_is_named_like_any_other() {
+    assert_eq!(
+        message(ConfigBuilder::new().set("env.move_amont=5")),
+        "--set env.move_amont=5: unknown key `env.move_amont`, did you mean `env.move_amount`?"
+    );
+    assert_eq!(
+        message(file("[env]\nmove_amount = \"far\"\n")),
+        "run.toml:2:15: `env.move_amount` is \"far\", expected a number"
+    );
+    assert_eq!(
+        message(file("[env]\nmove_amount = 99.0\n").unwrap().build()),
+        "run.toml:2:15: `env.move_amount` is 99, expected a value in (0, 32]"
+    );
+    let unknown_units = message(ConfigBuilder::new().set("env.units=paper"));
+    assert!(
+        unknown_units
+            .starts_with("--set env.units=paper: `env.units` is \"paper\", expected `liberty`"),
+        "{unknown_units}"
+    );
+}
+
+#[test]
+fn an_unknown_map_is_named_with_its_place_and_its_neighbour() {
+    assert_eq!(
+        message(file("env.map = \"2s3x\"").unwrap().build()),
+        "run.toml:1:11: unknown map `2s3x`, did you mean `2s3z`?"
+    );
 }
 
 fn choice() -> impl Strategy<Value = PartitionChoice> {
@@ -151,8 +181,8 @@ prop_compose! {
         (start, share) in (0.0..=1.0f64, 0.0..=1.0f64),
         (steps_env, seed) in (1u64..=1 << 53, 0u64..=1 << 53),
         (partitions, thin, central_v, rmsprop) in (choice(), any::<bool>(), any::<bool>(), any::<bool>()),
-        map in "[a-z0-9_\"\\\\]{1,8}",
-        move_amount in 0i64..9,
+        map in prop::sample::select(mackrl_env::registry::names()),
+        move_amount in 0.1f32..=32.0,
     ) -> Config {
         let mut config = Config::default();
         config.learner.gamma = gamma;
@@ -167,8 +197,8 @@ prop_compose! {
         if thin { config.policy.common_knowledge = CommonKnowledgeFeatures::Thin; }
         if central_v { config.policy.algorithm = Algorithm::CentralV; }
         if rmsprop { config.learner.optimiser = OptimiserKind::Rmsprop; }
-        config.env.map = map;
-        config.env.settings.insert("move_amount".to_owned(), move_amount.into());
+        config.env.map = map.to_owned();
+        config.env.settings.move_amount = move_amount;
         config
     }
 }
