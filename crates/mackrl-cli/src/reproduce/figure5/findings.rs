@@ -9,8 +9,10 @@ use mackrl_env::matrix_game::ObservationDistribution;
 
 use super::report::{Delegation, Published, Quantity};
 
-/// Differences up to this count as none; the game's returns lie in [0, 1].
-pub(super) const EQUAL: f64 = 0.02;
+/// Learners that differ by no more than this count as equal; the game's returns lie in [0, 1].
+pub(super) const EQUAL: f64 = 0.01;
+/// A curve within this of another, of which one was read from a picture or is an ideal, counts as near it.
+pub(super) const NEAR: f64 = 0.02;
 /// Standard errors on either side of a mean that are believed.
 pub(super) const ERRORS: f64 = 2.0;
 /// Rounding of sums of a few hundred products.
@@ -46,7 +48,15 @@ impl Findings<'_> {
     /// Whether `first` equals `second` at `point`, and their difference in words.
     pub(super) fn equal(&self, first: Learner, second: Learner, point: usize) -> (bool, String) {
         let (mean, sem) = self.difference(first, second, point);
-        (mean.abs() + ERRORS * sem <= EQUAL, in_words(mean, sem))
+        let equal = mean.abs() + ERRORS * sem <= EQUAL;
+        let words = in_words(mean, sem);
+        if equal || mean.abs() <= ERRORS * sem {
+            return (equal, words);
+        }
+        (
+            false,
+            format!("{words} ({:.1} standard errors from 0)", mean.abs() / sem),
+        )
     }
 
     /// Whether `first` is above `second` at `point`, and their difference in words.
