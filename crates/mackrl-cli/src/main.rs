@@ -9,10 +9,8 @@ mod commands;
 mod failure;
 mod output;
 mod plot;
-#[cfg_attr(not(test), expect(dead_code, reason = "training is wired next"))]
 mod progress;
 mod reproduce;
-#[cfg_attr(not(test), expect(dead_code, reason = "training is wired next"))]
 mod run_folder;
 
 use std::process::ExitCode;
@@ -23,6 +21,10 @@ use crate::args::{Cli, Command};
 
 fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
+        Command::Train(args) => commands::train::run(&args),
+        Command::Evaluate(args) => commands::evaluate::run(&args),
+        Command::Certify(args) => commands::certify::run(&args),
+        Command::ExecuteAgent(args) => commands::execute_agent::run(&args),
         Command::Reproduce(args) => commands::reproduce::run(&args),
         Command::Maps(args) => commands::maps::run(&args),
         Command::Config(args) => commands::config::run(&args),

@@ -34,6 +34,7 @@ pub(crate) struct Progress {
 enum Style {
     Terminal,
     Plain,
+    #[cfg(test)]
     Silent,
 }
 
@@ -48,6 +49,7 @@ impl Progress {
     }
 
     /// Shows nothing.
+    #[cfg(test)]
     pub(crate) fn silent() -> Self {
         Self::with_style(Style::Silent)
     }
@@ -87,6 +89,7 @@ impl Progress {
             // Back to the start of the line, and clear what is left of the previous one.
             Style::Terminal => write_stderr(&format!("\r{line}\x1b[K")),
             Style::Plain => write_stderr(&format!("{line}\n")),
+            #[cfg(test)]
             Style::Silent => {}
         }
     }
@@ -96,6 +99,7 @@ fn is_due(style: Style, shown: Instant, now: Instant) -> bool {
     let interval = match style {
         Style::Terminal => TERMINAL_INTERVAL,
         Style::Plain => PLAIN_INTERVAL,
+        #[cfg(test)]
         Style::Silent => return false,
     };
     now.duration_since(shown) >= interval

@@ -51,7 +51,15 @@ impl Story {
 #[test]
 fn help_teaches_every_command() {
     let mut help = type_in("--help").succeeds();
-    for command in ["maps", "config", "bench env"] {
+    for command in [
+        "train",
+        "evaluate",
+        "certify",
+        "reproduce figure5",
+        "maps",
+        "config",
+        "bench env",
+    ] {
         help += &format!("\n$ mackrl {command} --help\n");
         help += &type_in(&format!("{command} --help")).succeeds();
     }

@@ -9,8 +9,7 @@ use clap::{Args, Parser, Subcommand};
 use crate::reproduce::figure5::Figure5Options;
 pub(crate) use bench::{BenchArgs, BenchCommand, BenchEnvironmentArgs};
 pub(crate) use configuration::ConfigurationArgs;
-
-pub(crate) use runs::{CertifyArgs, EvaluateArgs, TrainArgs};
+pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, TrainArgs};
 
 /// Teaches teams to coordinate without communicating, by acting jointly on what they commonly know.
 ///
@@ -28,6 +27,11 @@ pub(crate) struct Cli {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    Train(TrainArgs),
+    Evaluate(EvaluateArgs),
+    Certify(CertifyArgs),
+    #[command(hide = true)]
+    ExecuteAgent(ExecuteAgentArgs),
     Reproduce(ReproduceArgs),
     Maps(MapsArgs),
     Config(ConfigArgs),

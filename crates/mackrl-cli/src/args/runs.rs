@@ -60,8 +60,9 @@ pub(crate) struct EvaluateArgs {
 /// Prove that a trained team runs decentralised
 ///
 /// Starts one process per agent, gives each only its own local views, its number, the weights and the seed, and compares
-/// every action with the central run, sampled and greedy, for whole episodes. Exit code 1 and the first counter-example
-/// if one action differs.
+/// every action, and every number that a controller reads, with the central run: sampled and greedy, for whole episodes. Then
+/// repeats the central run in worlds in which everything that an agent does not see is replaced by noise, and demands that
+/// its actions stay the same. Exit code 1 and the first counter-example if anything differs.
 ///
 /// Example: mackrl certify runs/3m-mackrl-seed1 --episodes 100 --json
 #[derive(Debug, Args)]
@@ -70,13 +71,31 @@ pub(crate) struct CertifyArgs {
     #[arg(value_name = "DIR")]
     pub(crate) run: PathBuf,
 
-    /// Episodes to compare
+    /// Episodes to compare in each mode, sampled and greedy
     #[arg(long, value_name = "N", default_value = "100")]
     pub(crate) episodes: NonZeroUsize,
+
+    /// Seed of the episodes [default: the run's own]
+    #[arg(long, value_name = "S")]
+    pub(crate) seed: Option<u64>,
 
     /// Print a JSON object instead of a table
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// Live as one agent of a trained team: read local views from stdin, write actions to stdout, one JSON object a line
+///
+/// `mackrl certify` starts one such process per agent.
+#[derive(Debug, Args)]
+pub(crate) struct ExecuteAgentArgs {
+    /// Run folder that `mackrl train` wrote
+    #[arg(value_name = "DIR")]
+    pub(crate) run: PathBuf,
+
+    /// Number of the agent, from 0
+    #[arg(long, value_name = "I")]
+    pub(crate) agent: usize,
 }
 
 #[derive(Debug, Args)]

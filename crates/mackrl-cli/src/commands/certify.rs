@@ -1,17 +1,112 @@
 //! `mackrl certify`: whether a trained team runs decentralised.
 
+use std::{
+    io::{BufRead, BufReader, Write},
+    path::Path,
+    process::{Child, ChildStdin, ChildStdout, Command, Stdio},
+};
+
+use anyhow::Context;
+use mackrl::{
+    decentralised::{AgentLink, Answer, Certificate, Request, Subject},
+    training::{
+        assembly::{self, World},
+        read_weights,
+    },
+};
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::{args::CertifyArgs, failure::Failure, output, run_folder::Run};
+use crate::{args::CertifyArgs, failure::Failure, output, reproduce::Meter, run_folder::Run};
 
-/// Prints what `compare` finds about the trained team in so many episodes, and fails if an action differs.
-pub(crate) fn run<C: Serialize>(
-    args: &CertifyArgs,
-    compare: impl FnOnce(&Run, usize) -> anyhow::Result<C>,
-) -> anyhow::Result<()> {
-    let certificate = compare(&Run::open(&args.run)?, args.episodes.get())?;
+/// Compares a trained team's central run with its agents in processes of their own, and fails if anything differs.
+pub(crate) fn run(args: &CertifyArgs) -> anyhow::Result<()> {
+    let run = Run::open(&args.run)?;
+    let certificate = certify(&args.run, &run, args)?;
     print(&certificate, args.json)
+}
+
+fn certify(folder: &Path, run: &Run, args: &CertifyArgs) -> anyhow::Result<Certificate> {
+    let world = World::new(&run.config)?;
+    let policy = assembly::policy(&run.config, &world)?;
+    let weights = policy.weights(&read_weights(policy.layout(), &run.weights)?);
+    let mut links = (0..world.spec().agents)
+        .map(|agent| Ok(Box::new(AgentProcess::start(folder, agent)?) as Box<dyn AgentLink>))
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    let mut environment = world.environments(1)?.remove(0);
+    let mut subject = Subject {
+        policy: &*policy,
+        weights: &weights,
+        environment: &mut *environment,
+        links: &mut links,
+        seed: args.seed.unwrap_or(run.config.run.seed),
+        exploration: run.config.exploration.finish,
+    };
+    let meter = Meter::new("episodes");
+    Ok(subject.certify(args.episodes.get(), |done, total| meter.report(done, total))?)
+}
+
+/// An agent in a process of its own. All that reaches it are the requests written to its stdin.
+struct AgentProcess {
+    child: Child,
+    requests: Option<ChildStdin>,
+    answers: BufReader<ChildStdout>,
+}
+
+impl AgentProcess {
+    fn start(folder: &Path, agent: usize) -> anyhow::Result<Self> {
+        let program = std::env::current_exe().context("cannot find this program")?;
+        let mut child = Command::new(program)
+            .arg("execute-agent")
+            .arg(folder)
+            .args(["--agent", &agent.to_string()])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .with_context(|| format!("cannot start a process for agent {agent}"))?;
+        let requests = child.stdin.take();
+        let answers = child
+            .stdout
+            .take()
+            .context("an agent's process has no stdout")?;
+        Ok(Self {
+            child,
+            requests,
+            answers: BufReader::new(answers),
+        })
+    }
+
+    fn exchange(&mut self, request: &Request) -> anyhow::Result<Option<Answer>> {
+        let requests = self.requests.as_mut().context("the process has ended")?;
+        let line = serde_json::to_string(request)? + "\n";
+        requests
+            .write_all(line.as_bytes())
+            .and_then(|()| requests.flush())?;
+        if matches!(request, Request::Begin { .. }) {
+            return Ok(None);
+        }
+        let mut answer = String::new();
+        self.answers.read_line(&mut answer)?;
+        Ok(Some(
+            serde_json::from_str(&answer).context("the answer is no answer")?,
+        ))
+    }
+}
+
+impl AgentLink for AgentProcess {
+    fn ask(&mut self, request: Request) -> Result<Option<Answer>, mackrl::Error> {
+        self.exchange(&request)
+            .map_err(|error| mackrl::Error::Data(format!("an agent's process failed: {error:#}")))
+    }
+}
+
+/// The process ends when it has nothing more to read.
+impl Drop for AgentProcess {
+    fn drop(&mut self) {
+        drop(self.requests.take());
+        // Whether it ended well does not matter any more; what it answered was compared.
+        let _ = self.child.wait();
+    }
 }
 
 /// Prints a certificate, a JSON object with `mismatches` and what else was counted, and fails if there are any.

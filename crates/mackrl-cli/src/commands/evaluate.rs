@@ -1,36 +1,19 @@
 //! `mackrl evaluate`: how well a trained team plays.
 
+use mackrl::training::evaluate;
 use serde::Serialize;
 use serde_json::Value;
 
 use crate::{args::EvaluateArgs, output, run_folder::Run};
 
-/// What is to be played.
-#[derive(Debug)]
-pub(crate) struct Order {
-    /// The trained team.
-    pub(crate) run: Run,
-    /// Episodes to play, at least 1.
-    pub(crate) episodes: usize,
-    /// Seed of the episodes.
-    pub(crate) seed: u64,
-    /// Threads to use.
-    pub(crate) threads: usize,
-}
-
-/// Prints what `play` makes of the trained team.
-pub(crate) fn run<E: Serialize>(
-    args: &EvaluateArgs,
-    play: impl FnOnce(&Order) -> Result<E, mackrl::Error>,
-) -> anyhow::Result<()> {
+/// Plays greedy episodes with a trained team and prints how it did.
+pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     let run = Run::open(&args.run)?;
-    let order = Order {
-        episodes: args.episodes.get(),
-        seed: args.seed.unwrap_or(run.config.run.seed),
-        threads: args.threads.count(),
-        run,
-    };
-    print(&play(&order)?, args.json)
+    let seed = args.seed.unwrap_or(run.config.run.seed);
+    let episodes = args.episodes.get();
+    let threads = args.threads.count();
+    let evaluation = evaluate(&run.config, &run.weights, episodes, seed, threads)?;
+    print(&evaluation, args.json)
 }
 
 /// Prints an evaluation: a JSON object of numbers, or a table in which each mean stands beside its standard error.

@@ -5,7 +5,7 @@ use std::{
     time::Instant,
 };
 
-use mackrl::config::Config;
+use mackrl::{config::Config, training::Trainer};
 use serde::Serialize;
 
 use crate::{
@@ -17,21 +17,57 @@ use crate::{
 
 /// What one update gave.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Update {
-    /// The metrics as one JSON object, without a line break.
-    pub(crate) metrics: String,
+struct Update {
+    /// A row of metrics as one JSON object, without a line break, if one was due.
+    metrics: Option<String>,
     /// How the run stands, for the person who waits.
-    pub(crate) standing: Standing,
+    standing: Standing,
 }
 
 /// Something that learns from one batch of episodes after the other.
-pub(crate) trait Training {
+trait Training {
     /// Plays and learns from one batch.
     fn update(&mut self) -> Result<Update, mackrl::Error>;
     /// Whether the configured number of steps has been played.
     fn finished(&self) -> bool;
     /// The weights as safetensors.
     fn weights(&self) -> Vec<u8>;
+}
+
+/// A trainer, and what it last reported for the person who waits.
+struct Reporting {
+    trainer: Trainer,
+    standing: Standing,
+}
+
+impl Training for Reporting {
+    fn update(&mut self) -> Result<Update, mackrl::Error> {
+        let row = self.trainer.update()?;
+        self.standing.steps_env = self.trainer.steps_env();
+        if let Some(row) = &row {
+            let latest = |name, before| row.get(name).or(before);
+            let Standing {
+                battle_won_mean,
+                delegation_rate,
+                ..
+            } = self.standing;
+            self.standing.battle_won_mean = latest("test_battle_won_mean", battle_won_mean);
+            self.standing.delegation_rate = latest("mackrl/delegation_rate", delegation_rate);
+        }
+        let metrics = row.map(|row| serde_json::to_string(&row).expect("numbers can be written"));
+        Ok(Update {
+            metrics,
+            standing: self.standing,
+        })
+    }
+
+    fn finished(&self) -> bool {
+        self.trainer.finished()
+    }
+
+    fn weights(&self) -> Vec<u8> {
+        self.trainer.weights()
+    }
 }
 
 /// What a finished run says of itself.
@@ -47,18 +83,20 @@ struct Summary {
     steps_per_s: f64,
 }
 
-/// Trains what `start` makes of the configuration and the number of threads.
-///
-/// Everything that can be wrong with what was typed is found before the run folder is created.
-pub(crate) fn run<T: Training>(
-    args: &TrainArgs,
-    start: impl FnOnce(&Config, usize) -> Result<T, mackrl::Error>,
-) -> anyhow::Result<()> {
+/// Trains a team. Everything that can be wrong with what was typed is found before the run folder is created.
+pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<()> {
     let config = args.configuration.layers()?.build()?;
     let path = args.out.clone().unwrap_or_else(|| default_folder(&config));
     RunFolder::check_free(&path)?;
     let threads = args.threads.count();
-    let mut training = start(&config, threads)?;
+    let standing = Standing {
+        steps_env_total: config.run.steps_env,
+        ..Standing::default()
+    };
+    let mut training = Reporting {
+        trainer: Trainer::new(&config, threads)?,
+        standing,
+    };
     let mut folder = RunFolder::create(&path, &config, threads)?;
     let summary = train_into(&mut folder, &mut training, &mut Progress::new())?;
     print(&summary, args.json)
@@ -101,7 +139,9 @@ fn train(
     let mut steps_env = 0;
     while !training.finished() {
         let Update { metrics, standing } = training.update()?;
-        folder.append_metrics(&metrics)?;
+        if let Some(metrics) = metrics {
+            folder.append_metrics(&metrics)?;
+        }
         progress.show(&standing);
         steps_env = standing.steps_env;
     }
@@ -148,7 +188,7 @@ mod tests {
                 return Err(mackrl::Error::Data("planted".to_owned()));
             }
             Ok(Update {
-                metrics: format!("{{\"t_env\":{}}}", self.updates),
+                metrics: Some(format!("{{\"t_env\":{}}}", self.updates)),
                 standing: Standing {
                     steps_env: self.updates,
                     ..Standing::default()

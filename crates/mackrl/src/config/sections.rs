@@ -91,6 +91,8 @@ section! {
     "run" RunConfig {
         /// Environment steps after which training ends; the batch that reaches it is finished.
         steps_env: u64 = 1_000_000, "an integer in [1, 2^53]", |steps| (1..=EXACT).contains(steps);
+        /// Environment steps between two rows of training metrics; tests give rows of their own.
+        metrics_interval_steps_env: u64 = 2_000, "an integer in [1, 2^53]", |steps| (1..=EXACT).contains(steps);
         /// Seed from which every random draw of the run is derived; known to all agents.
         seed: u64 = 1, "an integer in [0, 2^53]", |seed| (0..=EXACT).contains(seed);
     }

@@ -137,7 +137,8 @@ impl Executor for PairwiseExecutor {
         step: usize,
         behaviour: Behaviour,
     ) -> Action {
-        if !is_alive(view) {
+        self.own.ran = is_alive(view);
+        if !self.own.ran {
             return forced_action(view);
         }
         self.run_selector(weights, view);
@@ -155,6 +156,9 @@ impl Executor for PairwiseExecutor {
     }
 
     fn controller_inputs(&self) -> Vec<ControllerInput> {
+        if !self.own.ran {
+            return Vec::new();
+        }
         let selector = self.selector.iter();
         let mut inputs: Vec<_> = selector
             .map(|memory| memory.input(0, ControllerId::PairSelector))
@@ -177,6 +181,8 @@ pub(crate) struct AgentExecutor {
     memory: ControllerMemory,
     agent: AgentId,
     last_action: Option<Action>,
+    /// Whether the controllers ran at the latest step; those of the dead rest.
+    ran: bool,
 }
 
 impl AgentExecutor {
@@ -187,6 +193,7 @@ impl AgentExecutor {
             memory,
             agent,
             last_action: None,
+            ran: false,
         }
     }
 
@@ -207,6 +214,7 @@ impl Executor for AgentExecutor {
     fn begin(&mut self) {
         self.memory.begin(Recording::Off);
         self.last_action = None;
+        self.ran = false;
     }
 
     fn act(
@@ -217,7 +225,8 @@ impl Executor for AgentExecutor {
         step: usize,
         behaviour: Behaviour,
     ) -> Action {
-        if !is_alive(view) {
+        self.ran = is_alive(view);
+        if !self.ran {
             return forced_action(view);
         }
         self.run(weights, view, behaviour.exploration);

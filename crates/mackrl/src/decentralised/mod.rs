@@ -1,15 +1,22 @@
 //! Execution by one agent alone, and the certificate that it equals the central run.
 //!
 //! Training is central; what it yields must not be. An [`Executor`] is one agent with the weights, the shared seed and its own
-//! local views, and nothing else. [`certify`](mod@certify) plays whole episodes with N executors beside the central run and
-//! compares every action, and plays the central run again in worlds where everything that an agent does not see is different.
+//! local views, and nothing else. [`Subject::certify`] plays whole episodes with N executors beside the central run and compares
+//! every action, and plays the central run again in worlds where everything that an agent does not see is different.
 
+mod certificate;
 mod executor;
+mod message;
 
 use mackrl_env::{Action, AgentId, EpisodeKey, LocalView};
 
 use self::executor::{AgentExecutor, PairwiseExecutor};
+pub use self::{
+    certificate::{AgentLink, Certificate, Check, CounterExample, DifferingInput, Subject},
+    message::{Answer, ReceivedView, Request, ViewMessage, serve_agent},
+};
 use crate::{
+    Error,
     baselines::CentralV,
     hierarchy::PairwiseMackrl,
     policy::{Behaviour, ControllerInput, Policy, Weights},
@@ -52,3 +59,45 @@ impl Decentralised for CentralV {
         Box::new(AgentExecutor::new(self.agents.clone(), agent))
     }
 }
+
+/// An agent in this process, reached through the same messages as one in another.
+pub struct InProcessAgent<'a> {
+    executor: Box<dyn Executor>,
+    weights: &'a Weights,
+    episode: Option<(EpisodeKey, Behaviour)>,
+}
+
+impl<'a> InProcessAgent<'a> {
+    /// An agent that acts with `executor` and `weights`.
+    #[must_use]
+    pub fn new(executor: Box<dyn Executor>, weights: &'a Weights) -> Self {
+        Self {
+            executor,
+            weights,
+            episode: None,
+        }
+    }
+}
+
+impl AgentLink for InProcessAgent<'_> {
+    fn ask(&mut self, request: Request) -> Result<Option<Answer>, Error> {
+        message::answer(
+            &mut *self.executor,
+            self.weights,
+            &mut self.episode,
+            request,
+        )
+    }
+}
+
+impl std::fmt::Debug for InProcessAgent<'_> {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter
+            .debug_struct("InProcessAgent")
+            .field("episode", &self.episode)
+            .finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -39,7 +39,7 @@ pub enum Recording {
 }
 
 /// How choices are made during an episode.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Behaviour {
     /// Sampled or greedy.
     pub mode: Mode,
@@ -53,6 +53,19 @@ impl Behaviour {
         mode: Mode::Greedy,
         exploration: 0.0,
     };
+
+    /// What training uses: draws, with exploration ε in [0, 1].
+    #[must_use]
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "ε is rounded to the networks' precision"
+    )]
+    pub const fn sampled(exploration: f64) -> Self {
+        Self {
+            mode: Mode::Sampled,
+            exploration: exploration as f32,
+        }
+    }
 }
 
 /// One step of the environments that an actor plays in.

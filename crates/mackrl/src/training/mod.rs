@@ -1,1 +1,16 @@
 //! The training loop: rollout, learner, tests and metrics.
+//!
+//! This is the one place where a configuration becomes objects and where worlds, policies and learners meet. A run is a
+//! function of its configuration alone: the number of threads changes no result, and only metrics under `sys/` depend on the
+//! machine and the clock.
+
+pub mod assembly;
+mod evaluation;
+mod metrics;
+mod trainer;
+mod weights;
+
+pub use evaluation::{Evaluation, evaluate};
+pub use metrics::{METRICS, MetricRow};
+pub use trainer::Trainer;
+pub use weights::{read_weights, write_weights};

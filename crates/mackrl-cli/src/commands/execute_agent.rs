@@ -1,0 +1,35 @@
+//! `mackrl execute-agent`: one agent of a trained team, alone in a process.
+
+use std::io;
+
+use mackrl::{
+    decentralised::serve_agent,
+    training::{
+        assembly::{self, World},
+        read_weights,
+    },
+};
+use mackrl_env::AgentId;
+
+use crate::{args::ExecuteAgentArgs, failure::Failure, run_folder::Run};
+
+/// Answers what arrives on stdin until it ends.
+pub(crate) fn run(args: &ExecuteAgentArgs) -> anyhow::Result<()> {
+    let run = Run::open(&args.run)?;
+    let world = World::new(&run.config)?;
+    let agents = world.spec().agents;
+    if args.agent >= agents {
+        let message = format!("--agent is {}, expected less than {agents}", args.agent);
+        return Err(Failure::BadData { message }.into());
+    }
+    let policy = assembly::policy(&run.config, &world)?;
+    let weights = policy.weights(&read_weights(policy.layout(), &run.weights)?);
+    let mut executor = policy.executor(AgentId::new(args.agent));
+    serve_agent(
+        &mut *executor,
+        &weights,
+        io::stdin().lock(),
+        io::stdout().lock(),
+    )?;
+    Ok(())
+}

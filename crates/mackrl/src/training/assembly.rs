@@ -1,0 +1,112 @@
+//! From a configuration to the objects that it describes.
+
+use std::sync::Arc;
+
+use mackrl_env::{Environment, EnvironmentSpec, PriorKnowledge};
+
+use crate::{
+    Error,
+    baselines::CentralV,
+    central_critic::{CriticSettings, ReturnSettings},
+    config::{self, Algorithm, Config, EnvironmentConfig},
+    decentralised::Decentralised,
+    hierarchy::{Delegation, HierarchySettings, PairwiseMackrl},
+    learner::LearnerSettings,
+    nn::OptimiserKind,
+};
+
+/// Builds worlds of the kind that a configuration names.
+#[derive(Debug, Clone)]
+pub struct World {
+    config: EnvironmentConfig,
+    spec: EnvironmentSpec,
+    prior: Arc<dyn PriorKnowledge>,
+}
+
+impl World {
+    /// Reads the configuration's `env` section.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if there is no such map or the world refuses a setting.
+    pub fn new(config: &Config) -> Result<Self, Error> {
+        let environment = config.env.make()?;
+        let (spec, prior) = (environment.spec().clone(), environment.prior_knowledge());
+        Ok(Self {
+            config: config.env.clone(),
+            spec,
+            prior,
+        })
+    }
+
+    /// Sizes and limits.
+    #[must_use]
+    pub const fn spec(&self) -> &EnvironmentSpec {
+        &self.spec
+    }
+
+    /// What every agent knows before the game.
+    #[must_use]
+    pub fn prior(&self) -> Arc<dyn PriorKnowledge> {
+        Arc::clone(&self.prior)
+    }
+
+    /// `count` worlds.
+    ///
+    /// # Errors
+    /// [`Error::Config`] as [`World::new`].
+    pub fn environments(&self, count: usize) -> Result<Vec<Box<dyn Environment>>, Error> {
+        (0..count).map(|_| self.config.make()).collect()
+    }
+}
+
+/// The policy that a configuration describes, for a world.
+///
+/// # Errors
+/// [`Error::Config`] if the team is too large for the chosen partitions.
+pub fn policy(config: &Config, world: &World) -> Result<Box<dyn Decentralised>, Error> {
+    let hidden = config.policy.hidden;
+    match config.policy.algorithm {
+        Algorithm::CentralV => Ok(Box::new(CentralV::new(world.spec(), hidden))),
+        Algorithm::Mackrl => {
+            let settings = HierarchySettings {
+                common_knowledge: config.policy.common_knowledge,
+                partitions: config.policy.partitions.into(),
+                delegation: Delegation::Learned,
+                hidden,
+            };
+            let seed = config.run.seed;
+            Ok(Box::new(PairwiseMackrl::new(
+                world.spec(),
+                world.prior(),
+                &settings,
+                seed,
+            )?))
+        }
+    }
+}
+
+/// How the learner learns.
+pub(super) fn learner(config: &Config) -> LearnerSettings {
+    let settings = &config.learner;
+    let optimiser = match settings.optimiser {
+        config::OptimiserKind::Adam => OptimiserKind::ADAM,
+        config::OptimiserKind::Rmsprop => OptimiserKind::RMSPROP,
+    };
+    LearnerSettings {
+        optimiser,
+        learning_rate: settings.learning_rate,
+        gradient_norm_max: settings.gradient_norm_max,
+        critic: CriticSettings {
+            hidden: config.policy.hidden,
+            optimiser,
+            learning_rate: settings.critic_learning_rate,
+            gradient_norm_max: settings.gradient_norm_max,
+            returns: ReturnSettings {
+                gamma: settings.gamma,
+                lambda: settings.lambda,
+            },
+            target_interval_updates: settings.target_interval_updates,
+            bootstrap_at_time_limit: settings.bootstrap_at_time_limit,
+        },
+    }
+}

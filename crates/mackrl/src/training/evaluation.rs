@@ -1,0 +1,166 @@
+//! Greedy episodes with fixed weights.
+
+use mackrl_env::{EpisodeKey, Stream};
+use serde::{Deserialize, Serialize};
+
+use super::{assembly, read_weights};
+use crate::{
+    Error,
+    config::Config,
+    policy::{Behaviour, Policy, Recording, Tally, Weights},
+    rollout::{Rollout, RolloutSettings},
+};
+
+/// Episodes that are played at once.
+const PARALLEL_EPISODES: usize = 32;
+/// Environments of a shard.
+const SHARD_SIZE: usize = 8;
+
+/// How a team plays: means over episodes, each with its standard error.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Evaluation {
+    /// Episodes played.
+    pub episodes: usize,
+    /// Share of episodes that were won.
+    pub test_battle_won_mean: f64,
+    /// Its standard error.
+    pub test_battle_won_sem: f64,
+    /// Undiscounted return.
+    pub test_return_mean: f64,
+    /// Its standard error.
+    pub test_return_sem: f64,
+    /// Length in environment steps.
+    pub test_ep_length_mean: f64,
+    /// Its standard error.
+    pub test_ep_length_sem: f64,
+    /// Agents lost.
+    pub test_dead_allies_mean: f64,
+    /// Its standard error.
+    pub test_dead_allies_sem: f64,
+    /// Enemies defeated.
+    pub test_dead_enemies_mean: f64,
+    /// Its standard error.
+    pub test_dead_enemies_sem: f64,
+    /// What the controllers did, under the names that `METRICS` explains.
+    #[serde(flatten)]
+    pub controllers: std::collections::BTreeMap<String, f64>,
+}
+
+/// Plays `episodes` greedy episodes with the weights of a safetensors file. `threads` changes no result.
+///
+/// # Errors
+/// [`Error::Config`] or [`Error::Data`] if configuration and weights cannot be used together.
+pub fn evaluate(
+    config: &Config,
+    weights: &[u8],
+    episodes: usize,
+    seed: u64,
+    threads: usize,
+) -> Result<Evaluation, Error> {
+    let world = assembly::World::new(config)?;
+    let policy = assembly::policy(config, &world)?;
+    let parameters = read_weights(policy.layout(), weights)?;
+    let mut evaluator = Evaluator::new(&*policy, &world, episodes, threads)?;
+    let weights = policy.weights(&parameters);
+    evaluator.play(&weights, episodes, |episode| {
+        EpisodeKey::new(seed, Stream::Evaluation, episode)
+    })
+}
+
+/// Environments in which greedy episodes are played.
+#[derive(Debug)]
+pub(super) struct Evaluator {
+    rollout: Rollout,
+}
+
+impl Evaluator {
+    /// Room for playing some of `episodes` episodes at once.
+    pub(super) fn new(
+        policy: &dyn Policy,
+        world: &assembly::World,
+        episodes: usize,
+        threads: usize,
+    ) -> Result<Self, Error> {
+        let environments = world.environments(episodes.clamp(1, PARALLEL_EPISODES))?;
+        Ok(Self {
+            rollout: Rollout::new(policy, environments, SHARD_SIZE, threads),
+        })
+    }
+
+    /// Plays `episodes` greedy episodes, of which number `i` is named `key(i)`.
+    pub(super) fn play(
+        &mut self,
+        weights: &Weights,
+        episodes: usize,
+        key: impl Fn(u64) -> EpisodeKey,
+    ) -> Result<Evaluation, Error> {
+        let settings = RolloutSettings {
+            behaviour: Behaviour::GREEDY,
+            recording: Recording::Off,
+        };
+        let mut samples: [Vec<f64>; 5] = Default::default();
+        let mut tally = Tally::default();
+        let keys: Vec<EpisodeKey> = (0..episodes as u64).map(key).collect();
+        for keys in keys.chunks(self.rollout.environments()) {
+            self.rollout.play(weights, keys, settings)?;
+            tally.merge(&self.rollout.tally());
+            for episode in self.rollout.batches().flat_map(|batch| &batch.episodes) {
+                let statistics = episode.statistics;
+                let numbers = [
+                    f64::from(u8::from(statistics.battle_won)),
+                    episode.total_reward(),
+                    episode.steps() as f64,
+                    statistics.dead_allies as f64,
+                    statistics.dead_enemies as f64,
+                ];
+                samples
+                    .iter_mut()
+                    .zip(numbers)
+                    .for_each(|(sample, number)| sample.push(number));
+            }
+        }
+        let [won, return_, length, dead_allies, dead_enemies] =
+            samples.map(|sample| mean_and_standard_error(&sample));
+        Ok(Evaluation {
+            episodes,
+            test_battle_won_mean: won.0,
+            test_battle_won_sem: won.1,
+            test_return_mean: return_.0,
+            test_return_sem: return_.1,
+            test_ep_length_mean: length.0,
+            test_ep_length_sem: length.1,
+            test_dead_allies_mean: dead_allies.0,
+            test_dead_allies_sem: dead_allies.1,
+            test_dead_enemies_mean: dead_enemies.0,
+            test_dead_enemies_sem: dead_enemies.1,
+            controllers: tally
+                .means()
+                .map(|(name, mean)| (name.to_owned(), mean))
+                .collect(),
+        })
+    }
+}
+
+/// The mean and its standard error s/√n, with the unbiased sample variance; the error of a single sample is 0.
+fn mean_and_standard_error(sample: &[f64]) -> (f64, f64) {
+    let count = sample.len() as f64;
+    let mean = sample.iter().sum::<f64>() / count;
+    if sample.len() < 2 {
+        return (mean, 0.0);
+    }
+    let squares: f64 = sample.iter().map(|x| (x - mean).powi(2)).sum();
+    (mean, (squares / (count - 1.0) / count).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_standard_error_is_that_of_the_mean() {
+        let (mean, error) = mean_and_standard_error(&[1.0, 2.0, 4.0, 5.0]);
+        assert!((mean - 3.0).abs() < 1e-12);
+        assert!((error - (10.0_f64 / 3.0 / 4.0).sqrt()).abs() < 1e-12);
+        assert_eq!(mean_and_standard_error(&[7.0]), (7.0, 0.0));
+    }
+}

@@ -1,0 +1,237 @@
+//! The training loop: a batch of episodes, an update, now and then a test.
+
+use std::time::Instant;
+
+use mackrl_env::{EpisodeKey, Stream};
+
+use super::{Evaluation, MetricRow, assembly, evaluation::Evaluator, write_weights};
+use crate::{
+    Error,
+    config::Config,
+    decentralised::Decentralised,
+    learner::{Learner, UpdateReport},
+    policy::{Behaviour, Recording, Tally},
+    rollout::{Episode, Rollout, RolloutSettings},
+};
+
+/// Environments of a shard: half of the paper's eight, so that two cores have one shard each.
+const SHARD_SIZE: usize = 4;
+
+/// Trains one team.
+pub struct Trainer {
+    config: Config,
+    policy: Box<dyn Decentralised>,
+    learner: Learner,
+    rollout: Rollout,
+    evaluator: Evaluator,
+    steps_env: u64,
+    episodes: u64,
+    tests: u64,
+    next_test: u64,
+    next_row: u64,
+    interval: Interval,
+}
+
+/// What happened since the last row of metrics.
+struct Interval {
+    tally: Tally,
+    began: Instant,
+    steps_env: u64,
+}
+
+impl Trainer {
+    /// Prepares the run that `config` describes. `threads` changes no result.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if the configuration describes nothing that can be trained.
+    pub fn new(config: &Config, threads: usize) -> Result<Self, Error> {
+        let world = assembly::World::new(config)?;
+        let policy = assembly::policy(config, &world)?;
+        let environments = world.environments(config.learner.environments)?;
+        let sizes = [world.spec().agents, world.spec().state_size];
+        let settings = assembly::learner(config);
+        Ok(Self {
+            learner: Learner::new(&*policy, sizes, settings, config.run.seed, threads),
+            rollout: Rollout::new(&*policy, environments, SHARD_SIZE, threads),
+            evaluator: Evaluator::new(&*policy, &world, config.test.episodes, threads)?,
+            policy,
+            config: config.clone(),
+            steps_env: 0,
+            episodes: 0,
+            tests: 0,
+            next_test: 0,
+            next_row: config.run.metrics_interval_steps_env,
+            interval: Interval::new(0),
+        })
+    }
+
+    /// Environment steps so far, summed over the parallel environments.
+    #[must_use]
+    pub const fn steps_env(&self) -> u64 {
+        self.steps_env
+    }
+
+    /// Whether the configured number of steps has been played and the last test is done.
+    #[must_use]
+    pub const fn finished(&self) -> bool {
+        self.steps_env >= self.config.run.steps_env && self.next_test > self.steps_env
+    }
+
+    /// Plays and learns from one batch of episodes, or plays a test if one is due: before the first batch, at every interval,
+    /// and after the last batch. Gives a row of metrics at every test and at every interval between.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] if a gradient is not finite; the policy has not changed then.
+    pub fn update(&mut self) -> Result<Option<MetricRow>, Error> {
+        if self.steps_env >= self.next_test {
+            return self.test().map(Some);
+        }
+        self.learn()?;
+        if self.steps_env >= self.config.run.steps_env {
+            self.next_test = self.steps_env;
+        }
+        if self.steps_env < self.next_row || self.steps_env >= self.next_test {
+            return Ok(None);
+        }
+        Ok(Some(self.row()))
+    }
+
+    /// The weights of the policy and of the critic as safetensors.
+    #[must_use]
+    pub fn weights(&self) -> Vec<u8> {
+        let critic = self.learner.critic();
+        write_weights(&[
+            (self.policy.layout(), self.learner.parameters()),
+            (critic.layout(), critic.parameters()),
+        ])
+    }
+
+    /// ε of the bounded softmax now: it falls linearly with the environment steps.
+    fn exploration(&self) -> f64 {
+        let schedule = &self.config.exploration;
+        let progress = (self.steps_env as f64 / schedule.steps_env as f64).min(1.0);
+        schedule.start + (schedule.finish - schedule.start) * progress
+    }
+
+    /// Plays a batch of training episodes and learns from it.
+    fn learn(&mut self) -> Result<(), Error> {
+        let exploration = self.exploration();
+        let settings = RolloutSettings {
+            behaviour: Behaviour::sampled(exploration),
+            recording: Recording::ForLearning,
+        };
+        let batch = self.config.learner.environments as u64;
+        let seed = self.config.run.seed;
+        let keys: Vec<EpisodeKey> = (self.episodes..self.episodes + batch)
+            .map(|episode| EpisodeKey::new(seed, Stream::Training, episode))
+            .collect();
+        self.rollout.play(self.learner.weights(), &keys, settings)?;
+        self.episodes += batch;
+        for episode in self.rollout.batches().flat_map(|batch| &batch.episodes) {
+            self.steps_env += episode.steps() as u64;
+            self.interval.note_episode(episode);
+        }
+        let batches = self.rollout.batches().collect();
+        let report = self.learner.update(&*self.policy, batches)?;
+        self.interval.note_update(&report, exploration);
+        self.interval.tally.merge(&self.rollout.tally());
+        Ok(())
+    }
+
+    /// Plays greedy test episodes.
+    fn test(&mut self) -> Result<MetricRow, Error> {
+        let test = &self.config.test;
+        let (seed, first) = (self.config.run.seed, self.tests * test.episodes as u64);
+        let evaluation = self
+            .evaluator
+            .play(self.learner.weights(), test.episodes, |episode| {
+                EpisodeKey::new(seed, Stream::Test, first + episode)
+            })?;
+        self.tests += 1;
+        self.next_test = (self.steps_env / test.interval_steps_env + 1) * test.interval_steps_env;
+        let mut row = self.row();
+        append_test(&mut row, &evaluation);
+        Ok(row)
+    }
+
+    /// Everything since the last row.
+    fn row(&mut self) -> MetricRow {
+        let interval = std::mem::replace(&mut self.interval, Interval::new(self.steps_env));
+        let every = self.config.run.metrics_interval_steps_env;
+        self.next_row = (self.steps_env / every + 1) * every;
+        let mut row = MetricRow::default();
+        row.push("t_env", self.steps_env as f64);
+        row.push("episode", self.episodes as f64);
+        row.push("update", self.learner.updates() as f64);
+        interval
+            .tally
+            .means()
+            .for_each(|(name, mean)| row.push(name, mean));
+        let played = (self.steps_env - interval.steps_env) as f64;
+        if played > 0.0 {
+            row.push(
+                "sys/sps",
+                played / interval.began.elapsed().as_secs_f64().max(1e-9),
+            );
+        }
+        row
+    }
+}
+
+impl Interval {
+    fn new(steps_env: u64) -> Self {
+        Self {
+            tally: Tally::default(),
+            began: Instant::now(),
+            steps_env,
+        }
+    }
+
+    fn note_episode(&mut self, episode: &Episode) {
+        let statistics = episode.statistics;
+        let tally = &mut self.tally;
+        tally.add("return_mean", episode.total_reward(), 1.0);
+        tally.add("ep_length_mean", episode.steps() as f64, 1.0);
+        tally.add(
+            "battle_won_mean",
+            f64::from(u8::from(statistics.battle_won)),
+            1.0,
+        );
+        tally.add("dead_allies_mean", statistics.dead_allies as f64, 1.0);
+        tally.add("dead_enemies_mean", statistics.dead_enemies as f64, 1.0);
+    }
+
+    fn note_update(&mut self, report: &UpdateReport, exploration: f64) {
+        let mut add = |name: &str, value: f64| self.tally.add(name, value, 1.0);
+        add("epsilon", exploration);
+        add("pg_loss", report.policy_loss);
+        add("agent_grad_norm", report.policy_gradient_norm);
+        add("advantage_mean", report.advantage_mean);
+        add("critic_loss", report.critic.loss);
+        add("critic_grad_norm", report.critic.gradient_norm);
+        add("td_error_abs", report.critic.td_error_abs);
+        add("target_mean", report.critic.target_mean);
+    }
+}
+
+fn append_test(row: &mut MetricRow, evaluation: &Evaluation) {
+    row.push("test_battle_won_mean", evaluation.test_battle_won_mean);
+    row.push("test_return_mean", evaluation.test_return_mean);
+    row.push("test_ep_length_mean", evaluation.test_ep_length_mean);
+    row.push("test_dead_allies_mean", evaluation.test_dead_allies_mean);
+    row.push("test_dead_enemies_mean", evaluation.test_dead_enemies_mean);
+    let delegation = evaluation.controllers.iter();
+    for (name, value) in delegation.filter(|(name, _)| name.contains("delegation")) {
+        row.push(format!("test_{name}"), *value);
+    }
+}
+
+impl std::fmt::Debug for Trainer {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter
+            .debug_struct("Trainer")
+            .field("config", &self.config)
+            .field("steps_env", &self.steps_env)
+            .finish_non_exhaustive()
+    }
+}
