@@ -181,8 +181,11 @@ fn allows(rule: &Rule, name: &str, path: &[String]) -> bool {
         return path[0] != "mackrl_env" || rule.sees == Sight::Worlds;
     };
     match path[0].as_str() {
-        // Types at the root of the crate are its errors and numbers, which everybody may use.
-        "crate" => item == name || rule.imports.contains(item) || starts_upper(item),
+        // At the root of the crate are its errors, its numbers and its threads, which everybody may use.
+        "crate" => {
+            let is_shared = starts_upper(item) || item == "parallel";
+            item == name || rule.imports.contains(item) || is_shared
+        }
         "mackrl_env" => rule.sees >= needed_sight(item),
         _ => true,
     }

@@ -1,6 +1,6 @@
 //! The central critic and its sweep backwards through time.
 
-use mackrl_env::{EpisodeEnd, EpisodeKey};
+use mackrl_env::EpisodeKey;
 
 use super::{ReturnSettings, lambda_returns};
 use crate::{
@@ -170,7 +170,7 @@ impl CentralCritic {
         self.network.forward(&self.target_weights, &mut self.trace);
         let mut value_t = self.trace.outputs().to_vec();
         let mut next_value = 0.0;
-        if self.settings.bootstrap_at_time_limit && episode.end == Some(EpisodeEnd::Truncated) {
+        if self.settings.bootstrap_at_time_limit && episode.ends_by_time_limit() {
             self.trace.begin(1).copy_from_slice(episode.state(steps));
             self.network.forward(&self.weights, &mut self.trace);
             next_value = self.trace.outputs()[0];

@@ -24,6 +24,12 @@ impl Episode {
         self.reward_t.len()
     }
 
+    /// Whether the game would have gone on, had time not run out.
+    #[must_use]
+    pub fn ends_by_time_limit(&self) -> bool {
+        self.end == Some(EpisodeEnd::Truncated)
+    }
+
     /// Σ_t r_t, undiscounted.
     #[must_use]
     pub fn total_reward(&self) -> f64 {
