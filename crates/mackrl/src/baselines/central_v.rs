@@ -85,7 +85,7 @@ struct CentralVActor {
     /// Environment and agent of each row at this step.
     rows: Vec<(usize, AgentId)>,
     last_action_bn: Vec<Option<Action>>,
-    /// log p(u_t) at each step so far, if recorded.
+    /// log `p(u_t)` at each step so far, if recorded.
     log_p_bt: Vec<Vec<f32>>,
     team: usize,
     recording: Recording,

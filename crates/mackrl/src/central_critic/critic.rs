@@ -65,7 +65,7 @@ pub struct CentralCritic {
 struct Sweep {
     /// λ-returns \[T\].
     return_t: Vec<f32>,
-    /// r_t + γ V(s_{t+1}) − V(s_t) \[T\].
+    /// `r_t + γ V(s_{t+1}) − V(s_t)` \[T\].
     advantage_t: Vec<f32>,
     /// V(s_{t+1}) as it was when the sweep passed it.
     next_value: f32,
@@ -115,13 +115,13 @@ impl CentralCritic {
     ///
     /// Targets come from the target copy and are fixed before the sweep. Then, from the last time step to the first, the
     /// critic takes one optimiser step on the states of that time step (one per episode that lasted so long). Advantages use
-    /// the values that the sweep meets on its way: V(s_{t+1}) before, V(s_t) after the update at t + 1.
+    /// the values that the sweep meets on its way: `V(s_{t+1})` before, `V(s_t)` after the update at t + 1.
     ///
     /// # Shapes
-    /// `advantage_bt` becomes \[B\]\[T_b\].
+    /// `advantage_bt` becomes \[B\]\[T\], each episode with its own T.
     ///
     /// # Equation
-    /// A_t = r_t + γ V(s_{t+1}) − V(s_t), with V = 0 after the end (eq. 6).
+    /// `A_t = r_t + γ V(s_{t+1}) − V(s_t)`, with V = 0 after the end (eq. 6).
     ///
     /// # Errors
     /// [`Error::NotFinite`] if a gradient is not finite; parameters are then as after the step before.

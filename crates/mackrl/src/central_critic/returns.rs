@@ -18,7 +18,7 @@ pub struct ReturnSettings {
 /// which must be 0 if nothing comes after it (termination) and may bootstrap if the game would have gone on (truncation).
 ///
 /// # Equation
-/// G_t = r_t + γ (1 − λ) V(s_{t+1}) + γ λ G_{t+1} for t in 0..T, with G_T = V(s_T).
+/// `G_t = r_t + γ (1 − λ) V(s_{t+1}) + γ λ G_{t+1}` for t in 0..T, with `G_T = V(s_T)`.
 ///
 /// # Panics
 /// If the lengths do not fit each other.
@@ -83,20 +83,21 @@ mod tests {
         }
     }
 
-    /// The definition by the mixture of n-step returns: G = (1 − λ) Σ_n λ^{n−1} G^{(n)}, the last with the remaining weight.
+    /// The definition by the mixture of n-step returns: `G = (1 − λ) Σ_n λ^{n−1} G^{(n)}`, the last with the remaining weight.
     #[test]
     fn the_recursion_equals_the_mixture_of_n_step_returns() {
         let (gamma, lambda) = (0.9_f64, 0.8_f64);
+        let power = |base: f64, exponent: usize| base.powf(exponent as f64);
         let n_step = |t: usize, n: usize| {
-            let rewards: f64 = (0..n).map(|i| gamma.powi(i as i32) * REWARD_T[t + i]).sum();
-            rewards + gamma.powi(n as i32) * VALUE_T[t + n]
+            let rewards: f64 = (0..n).map(|i| power(gamma, i) * REWARD_T[t + i]).sum();
+            rewards + power(gamma, n) * VALUE_T[t + n]
         };
         for (t, return_) in returns(gamma, lambda).into_iter().enumerate() {
             let longest = 3 - t;
             let mixture: f64 = (1..longest)
-                .map(|n| (1.0 - lambda) * lambda.powi(n as i32 - 1) * n_step(t, n))
+                .map(|n| (1.0 - lambda) * power(lambda, n - 1) * n_step(t, n))
                 .sum::<f64>()
-                + lambda.powi(longest as i32 - 1) * n_step(t, longest);
+                + power(lambda, longest - 1) * n_step(t, longest);
             assert!(
                 (return_ - mixture).abs() < 1e-12,
                 "step {t}: {return_} is not {mixture}"

@@ -42,7 +42,11 @@ impl Actor for PeekingActor {
         self.0.act(weights, situation, actions_bn);
         let view = situation.observations.local_view(0, AgentId::new(0));
         let stop = Action::new(1);
-        if situation.observations.state(0)[2].to_bits() % 5 == 0 && view.available()[stop.index()] {
+        if situation.observations.state(0)[2]
+            .to_bits()
+            .is_multiple_of(5)
+            && view.available()[stop.index()]
+        {
             actions_bn[0] = stop;
         }
     }

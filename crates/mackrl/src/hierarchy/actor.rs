@@ -51,7 +51,7 @@ struct World {
     known_k: Vec<EntitySet>,
     partition_buffer: PartitionBuffer,
     path: Path,
-    /// log p(u_t) at each step so far, if recorded.
+    /// log `p(u_t)` at each step so far, if recorded.
     log_p_t: Vec<f32>,
     log_p_selector_p: Vec<f32>,
     log_p_pair_kc: Vec<f32>,

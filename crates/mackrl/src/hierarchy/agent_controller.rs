@@ -1,4 +1,4 @@
-//! π_a: one agent chooses its own action from its own history (level 3 of Table 1).
+//! `π_a`: one agent chooses its own action from its own history (level 3 of Table 1).
 
 use mackrl_env::{Action, AgentId, EnvironmentSpec, LocalView};
 

@@ -1,4 +1,4 @@
-//! What all controllers have in common: Linear → ReLU → GRU → Linear → masked softmax with bounded exploration.
+//! What all controllers have in common: a recurrent network and a masked softmax with bounded exploration.
 //!
 //! A [`Controller`] is the network; a [`ControllerMemory`] holds the rows that it works on, one per instance that still
 //! acts (a pair in an environment, say). Rows may leave between steps; those that stay keep their recurrence.
@@ -235,7 +235,7 @@ impl ControllerMemory {
     /// Adds Σ `weight_bt` ∇ log p(u) over all recorded choices to `gradient`.
     ///
     /// # Shapes
-    /// `weight_bt` \[B\]\[T_b\].
+    /// `weight_bt` \[B\]\[T\], each episode with its own T.
     pub(crate) fn backward(
         &mut self,
         controller: &Controller,
@@ -243,47 +243,37 @@ impl ControllerMemory {
         weight_bt: &[Vec<f32>],
         gradient: &mut [f32],
     ) {
-        let columns = self.sizes.outputs;
-        let softmax = self.softmax();
         // Choices were noted environment by environment; the gradient is written row by row.
         self.choices
             .sort_unstable_by_key(|choice| (choice.step, choice.row, choice.column));
+        let columns = self.sizes.outputs;
+        let softmax = self.softmax();
         let mut rest = self.choices.as_slice();
         let mut entries = Vec::with_capacity(columns);
-        let mut row_over_all = 0;
-        for t in 0..self.trace.steps() {
-            let rows = self.trace.rows(t);
-            let step_gradient = self.trace.logits_gradient_mut(t);
+        let mut tables = self
+            .log_p_rc
+            .chunks_exact(columns)
+            .zip(self.softmax_rc.chunks_exact(columns));
+        for step in 0..self.trace.steps() {
+            let step_gradient = self.trace.logits_gradient_mut(step);
             for (row, row_gradient) in step_gradient.chunks_exact_mut(columns).enumerate() {
-                let count = rest
+                let own = rest
                     .iter()
-                    .take_while(|c| (c.step, c.row) == (t, row))
+                    .take_while(|c| (c.step, c.row) == (step, row))
                     .count();
-                let (own, others) = rest.split_at(count);
-                rest = others;
                 entries.clear();
-                entries.extend(own.iter().map(|choice| {
+                entries.extend(rest[..own].iter().map(|choice| {
                     (
                         choice.column,
-                        choice.posterior * weight_bt[choice.environment][t],
+                        choice.posterior * weight_bt[choice.environment][step],
                     )
                 }));
-                let place = row_over_all * columns..(row_over_all + 1) * columns;
-                row_over_all += 1;
-                softmax.row_gradient(
-                    &self.log_p_rc[place.clone()],
-                    &self.softmax_rc[place],
-                    &entries,
-                    row_gradient,
-                );
+                rest = &rest[own..];
+                let (log_p, softmax_c) = tables.next().expect("every row has a table");
+                softmax.row_gradient(log_p, softmax_c, &entries, row_gradient);
             }
-            debug_assert_eq!(
-                step_gradient.len(),
-                rows * columns,
-                "a gradient for every row"
-            );
         }
-        if row_over_all > 0 {
+        if self.first_row + self.rows > 0 {
             controller
                 .network
                 .backward(weights, &mut self.trace, gradient);

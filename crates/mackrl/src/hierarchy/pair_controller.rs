@@ -1,4 +1,4 @@
-//! π_pc: a pair acts jointly on what it commonly knows, or delegates to its two members (level 2 of Table 1).
+//! `π_pc`: a pair acts jointly on what it commonly knows, or delegates to its two members (level 2 of Table 1).
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! π_ps: the whole team divides itself into pairs on what all its members commonly know (level 1 of Table 1).
+//! `π_ps`: the whole team divides itself into pairs on what all its members commonly know (level 1 of Table 1).
 
 use std::sync::Arc;
 

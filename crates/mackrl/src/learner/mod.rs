@@ -1,7 +1,7 @@
 //! On-policy actor-critic learning from the marginal probability of the joint action (eq. 6).
 //!
 //! One update takes a batch of whole episodes: the critic sweeps backwards through time and yields advantages, then the
-//! policy takes one step along Σ A_t ∇ log p(u_t). The learner sees episodes and actors, never an environment.
+//! policy takes one step along `Σ A_t ∇ log p(u_t)`. The learner sees episodes and actors, never an environment.
 //!
 //! Every shard has a gradient of its own, and they are summed in the order of the shards: the number of threads changes
 //! nothing.
@@ -33,11 +33,11 @@ pub struct LearnerSettings {
 /// What one update did.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct UpdateReport {
-    /// −mean of A_t log p(u_t), per agent.
+    /// −mean of `A_t log p(u_t)`, per agent.
     pub policy_loss: f64,
     /// Norm of the policy's gradient before clipping.
     pub policy_gradient_norm: f64,
-    /// Mean of A_t.
+    /// Mean of `A_t`.
     pub advantage_mean: f64,
     /// What the critic's sweep did.
     pub critic: CriticReport,
@@ -120,7 +120,7 @@ impl Learner {
     /// Learns from the batch that `shards` hold.
     ///
     /// # Equation
-    /// ∇J = 1 / (N Σ_b T_b) Σ_{b,t} A_{bt} ∇ log p(u_{bt}) (eq. 6), then one step of the optimiser.
+    /// `∇J = 1 / (N Σ_b T_b) Σ_{b,t} A_{bt} ∇ log p(u_{bt})` (eq. 6), then one step of the optimiser.
     ///
     /// # Errors
     /// [`Error::NotFinite`] if a gradient is not finite. The policy has not changed then.

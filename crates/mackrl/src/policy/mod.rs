@@ -123,11 +123,11 @@ pub trait Actor: Send {
     /// `actions_bn` \[B, N\]; rows of environments that have left are not touched.
     fn act(&mut self, weights: &Weights, situation: Situation<'_>, actions_bn: &mut [Action]);
 
-    /// Adds Σ_{b,t} `weight_bt` ∇ log p(u_t) to `gradient` and returns Σ_{b,t} `weight_bt` log p(u_t), where p is the
+    /// Adds `Σ_{b,t} weight_bt ∇ log p(u_t)` to `gradient` and returns `Σ_{b,t} weight_bt log p(u_t)`, where p is the
     /// marginal probability (eq. 5) of the joint action that was taken.
     ///
     /// # Shapes
-    /// `weight_bt` \[B\]\[T_b\]; `gradient` as the policy's layout.
+    /// `weight_bt` \[B\]\[T\], each episode with its own T; `gradient` as the policy's layout.
     fn backward(&mut self, weights: &Weights, weight_bt: &[Vec<f32>], gradient: &mut [f32]) -> f64;
 
     /// Adds what was seen since [`Self::begin`] (entropies, delegation, …) to `tally`.
@@ -141,11 +141,11 @@ pub trait Actor: Send {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ControllerId {
-    /// π_ps
+    /// `π_ps`
     PairSelector,
-    /// π_pc of these two agents, the lower first.
+    /// `π_pc` of these two agents, the lower first.
     PairController(AgentId, AgentId),
-    /// π_a of this agent.
+    /// `π_a` of this agent.
     AgentController(AgentId),
 }
 

@@ -30,7 +30,7 @@ impl Episode {
         self.end == Some(EpisodeEnd::Truncated)
     }
 
-    /// Σ_t r_t, undiscounted.
+    /// The sum of all rewards, undiscounted.
     #[must_use]
     pub fn total_reward(&self) -> f64 {
         self.reward_t.iter().map(|&reward| f64::from(reward)).sum()

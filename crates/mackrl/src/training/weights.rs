@@ -8,6 +8,9 @@ use crate::{Error, nn::ParameterLayout};
 ///
 /// # Shapes
 /// Each model's parameters are as its layout says.
+///
+/// # Panics
+/// If a model's parameters are not as many as its layout says.
 #[must_use]
 pub fn write_weights(models: &[(&ParameterLayout, &[f32])]) -> Vec<u8> {
     let mut bytes: Vec<(String, Vec<usize>, Vec<u8>)> = Vec::new();
