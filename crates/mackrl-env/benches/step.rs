@@ -46,7 +46,9 @@ impl Player {
         Self {
             observations: Observations::new(environment.spec(), 1),
             actions: vec![Action::default(); agents],
-            uniform: (0..agents * DRAWS).map(|i| key.uniform(0, Draw::Setup(i))).collect(),
+            uniform: (0..agents * DRAWS)
+                .map(|i| key.uniform(0, Draw::Setup(i)))
+                .collect(),
             episode: 0,
             draw: 0,
         }
@@ -75,7 +77,10 @@ impl Player {
 }
 
 fn nth_available(available: &[bool], uniform: f64) -> Action {
-    let count = available.iter().filter(|is_available| **is_available).count();
+    let count = available
+        .iter()
+        .filter(|is_available| **is_available)
+        .count();
     let mut left = uniform * count as f64;
     let is_chosen = |is_available: &bool| {
         left -= f64::from(u8::from(*is_available));

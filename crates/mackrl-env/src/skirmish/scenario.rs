@@ -38,6 +38,8 @@ const MAPS: &[(&str, &str)] = &[
     ("3s_vs_4z", include_str!("../../../../maps/3s_vs_4z.toml")),
     ("3s_vs_5z", include_str!("../../../../maps/3s_vs_5z.toml")),
     ("2m_vs_1z", include_str!("../../../../maps/2m_vs_1z.toml")),
+    ("6h_vs_8z", include_str!("../../../../maps/6h_vs_8z.toml")),
+    ("2s_vs_1sc", include_str!("../../../../maps/2s_vs_1sc.toml")),
 ];
 
 /// A map file as it is written.

@@ -243,8 +243,8 @@ impl UnitType {
             &self.name,
         )?;
         require(
-            (0.0..=16.0).contains(&self.speed),
-            "speed is in [0, 16]",
+            (0.0..=4.0).contains(&self.speed),
+            "speed is in [0, 4]",
             &self.name,
         )?;
         let others = [

@@ -26,7 +26,12 @@ impl Battle {
                 self.scratch.footing[index] = Footing::Gone;
                 continue;
             }
-            self.scratch.footing[index] = Footing::Standing;
+            let kind = usize::from(self.state.units[index].kind);
+            self.scratch.footing[index] = if field.profiles[kind].is_immobile() {
+                Footing::Braced
+            } else {
+                Footing::Standing
+            };
             self.tick(index);
             match self.target_of(index) {
                 Some(target) => self.fight(&field, index, usize::from(target), chance),
@@ -79,6 +84,7 @@ impl Battle {
         let waits = unit.stance == Stance::Aggressive && unit.backswing > 0.0;
         if let Order::Move { to } | Order::AttackMove { to } = unit.order
             && !waits
+            && !self.field.profiles[usize::from(unit.kind)].is_immobile()
         {
             let (x, y) = (self.state.x[index], self.state.y[index]);
             if [x, y] != to {
