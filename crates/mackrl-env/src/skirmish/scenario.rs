@@ -40,6 +40,14 @@ const MAPS: &[(&str, &str)] = &[
     ("2m_vs_1z", include_str!("../../../../maps/2m_vs_1z.toml")),
     ("6h_vs_8z", include_str!("../../../../maps/6h_vs_8z.toml")),
     ("2s_vs_1sc", include_str!("../../../../maps/2s_vs_1sc.toml")),
+    (
+        "so_many_baneling",
+        include_str!("../../../../maps/so_many_baneling.toml"),
+    ),
+    (
+        "bane_vs_bane",
+        include_str!("../../../../maps/bane_vs_bane.toml"),
+    ),
 ];
 
 /// A map file as it is written.

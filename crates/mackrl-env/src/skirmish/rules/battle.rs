@@ -26,6 +26,8 @@ pub(super) struct Scratch {
     pub(super) footing: Vec<Footing>,
     /// Hits that land at the end of this loop.
     pub(super) hits: Vec<Hit>,
+    /// Units that explode at the end of this loop.
+    pub(super) exploding: Vec<usize>,
     /// Where units are about to be.
     pub(super) steps: Steps,
     /// Units that can be in each other's way.
@@ -123,6 +125,7 @@ impl Battle {
         self.state.missiles.reserve(4 * units);
         self.state.blows.reserve(4 * units);
         self.scratch.hits.reserve(4 * units);
+        self.scratch.exploding.reserve(units);
         self.scratch.destination.resize(units, None);
         self.scratch.footing.resize(units, Footing::Standing);
         self.scratch.steps.resize(units);
