@@ -244,10 +244,7 @@ impl Battle {
             self.strike(usize::from(attacker), usize::from(target));
         }
         self.explode();
-        for index in 0..self.scratch.hits.len() {
-            let Hit { target, attacker } = self.scratch.hits[index];
-            self.respond(usize::from(target), usize::from(attacker));
-        }
+        self.respond();
         self.scratch.hits.clear();
     }
 

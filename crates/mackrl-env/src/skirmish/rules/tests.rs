@@ -413,7 +413,7 @@ fn a_fighter_stays_with_a_quarry_in_range_and_leaves_one_that_flees() {
     assert_eq!(
         arena.unit(enemy).quarry,
         Some(second),
-        "half a second later"
+        "when it looks again"
     );
 }
 
