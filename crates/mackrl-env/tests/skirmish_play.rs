@@ -49,7 +49,7 @@ fn fare(name: &str, policy: ScriptedPolicy, episodes: u64) -> (u64, f64) {
     let (mut won, mut total) = (0, 0.0);
     for episode in 0..episodes {
         play(&mut skirmish, policy, episode, |_, _, reward| {
-            total += f64::from(reward)
+            total += f64::from(reward);
         });
         won += u64::from(skirmish.statistics().battle_won);
     }

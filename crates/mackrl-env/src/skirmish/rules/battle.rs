@@ -61,7 +61,11 @@ impl Battle {
 
     /// Goes back (or forth) to `state`, which a battle on the same battlefield was in.
     pub fn restore(&mut self, state: &BattleState) {
-        self.state.clone_from(state);
+        self.state.x.clone_from(&state.x);
+        self.state.y.clone_from(&state.y);
+        self.state.units.clone_from(&state.units);
+        self.state.missiles.clone_from(&state.missiles);
+        self.state.blows.clone_from(&state.blows);
         self.reserve(self.state.units.len());
     }
 
