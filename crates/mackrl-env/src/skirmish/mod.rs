@@ -6,6 +6,7 @@
 
 pub mod error;
 mod face;
+mod paths;
 pub mod rules;
 pub mod scenario;
 pub mod scripted;

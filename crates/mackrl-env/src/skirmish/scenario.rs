@@ -38,6 +38,16 @@ const MAPS: &[(&str, &str)] = &[
     ("3s_vs_4z", include_str!("../../../../maps/3s_vs_4z.toml")),
     ("3s_vs_5z", include_str!("../../../../maps/3s_vs_5z.toml")),
     ("2m_vs_1z", include_str!("../../../../maps/2m_vs_1z.toml")),
+    ("6h_vs_8z", include_str!("../../../../maps/6h_vs_8z.toml")),
+    ("2s_vs_1sc", include_str!("../../../../maps/2s_vs_1sc.toml")),
+    (
+        "so_many_baneling",
+        include_str!("../../../../maps/so_many_baneling.toml"),
+    ),
+    (
+        "bane_vs_bane",
+        include_str!("../../../../maps/bane_vs_bane.toml"),
+    ),
 ];
 
 /// A map file as it is written.
@@ -270,6 +280,18 @@ impl MapFile {
     }
 }
 
+/// Mean of the groups' points, weighted by their sizes.
+fn centre(groups: &[Group]) -> [f32; 2] {
+    let units: usize = groups.iter().map(|group| group.count).sum();
+    [0, 1].map(|axis| {
+        groups
+            .iter()
+            .map(|group| group.at[axis] * group.count as f32)
+            .sum::<f32>()
+            / units as f32
+    })
+}
+
 fn check_point(point: [f32; 2]) -> Result<(), String> {
     if point
         .iter()
@@ -288,6 +310,7 @@ fn place_armies(
     field: &Battlefield,
     names: &[&str],
 ) -> Result<Vec<Recruit>, String> {
+    let fronts = [centre(&file.enemies.groups), centre(&file.allies.groups)];
     let mut taken = Vec::new();
     let mut recruits = Vec::new();
     for (team, group) in file.groups() {
@@ -296,13 +319,19 @@ fn place_armies(
             .position(|name| *name == group.unit)
             .unwrap_or_default();
         let profiles: Vec<&Profile> = vec![&field.profiles[kind]; group.count];
-        let places =
-            spread_around(group.at, &profiles, &field.terrain, &mut taken).ok_or_else(|| {
-                format!(
-                    "no room for {} {} at {:?}",
-                    group.count, group.unit, group.at
-                )
-            })?;
+        let places = spread_around(
+            group.at,
+            fronts[usize::from(team == Team::Enemy)],
+            &profiles,
+            &field.terrain,
+            &mut taken,
+        )
+        .ok_or_else(|| {
+            format!(
+                "no room for {} {} at {:?}",
+                group.count, group.unit, group.at
+            )
+        })?;
         let kind = u8::try_from(kind).map_err(|_| "more than 256 unit types".to_owned())?;
         recruits.extend(places.into_iter().map(|at| Recruit { kind, team, at }));
     }

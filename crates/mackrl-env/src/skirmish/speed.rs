@@ -27,6 +27,9 @@ impl Speed {
 
 /// Plays `environment` with random available actions for about `duration`, with observations, state and availability
 /// written at every step, on the calling thread.
+///
+/// # Panics
+/// If the environment refuses an action that it offered, against its contract.
 pub fn measure_speed(environment: &mut dyn Environment, duration: Duration) -> Speed {
     let spec = environment.spec().clone();
     let mut observations = Observations::new(&spec, 1);
@@ -73,7 +76,7 @@ impl Dice {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
         self.0 ^= self.0 << 17;
-        let mut left = (self.0 >> 32) * count >> 32;
+        let mut left = ((self.0 >> 32) * count) >> 32;
         for (action, _) in available
             .iter()
             .enumerate()

@@ -1,11 +1,13 @@
 //! Where units can walk: a grid of cells of one map unit.
 //!
-//! The walkable regions are those of the maps' cell flags. On terrain where every two walkable points are joined by a straight
-//! walkable line (the lane, the open field, the octagon) nobody needs a path, and none is computed.
+//! The walkable regions are those of the maps' cell flags. On the lane and the open field every two points are joined by a
+//! straight walkable line, so nobody needs a path and none is computed; elsewhere [`Terrain::waypoint`] leads round corners.
 
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
+
+use crate::skirmish::paths::Paths;
 
 /// Edge of the square map in map units and cells.
 pub const MAP_SIZE: usize = 32;
@@ -20,6 +22,14 @@ pub enum TerrainName {
     Open,
     /// A square with stepped corners.
     Octagon,
+    /// The arena of `6h_vs_8z`.
+    #[serde(rename = "arena-6h")]
+    Arena6h,
+    /// The arena of `2s_vs_1sc`.
+    #[serde(rename = "arena-2s")]
+    Arena2s,
+    /// A broad way from one corner to the other.
+    WindingSlope,
 }
 
 /// A walkability grid and what movement derives from it.
@@ -29,6 +39,8 @@ pub struct Terrain {
     walkable: Vec<bool>,
     /// Whether a cell and its eight neighbours are walkable, so that no wall is near.
     is_far_from_walls: Vec<bool>,
+    /// Ways round corners, where there are corners.
+    paths: Option<Paths>,
 }
 
 impl Terrain {
@@ -40,6 +52,19 @@ impl Terrain {
             TerrainName::Lane => &[[0, 31, 8, 23]],
             TerrainName::Open => &[[0, 31, 0, 31]],
             TerrainName::Octagon => &[[10, 21, 6, 25], [8, 23, 8, 23], [6, 25, 10, 21]],
+            TerrainName::Arena6h => &[[10, 19, 8, 19], [8, 21, 10, 17]],
+            TerrainName::Arena2s => &[[8, 19, 8, 19], [10, 17, 20, 21], [12, 15, 22, 23]],
+            TerrainName::WindingSlope => &[
+                [2, 7, 2, 3],
+                [2, 11, 4, 7],
+                [4, 15, 8, 11],
+                [8, 19, 12, 15],
+                [10, 19, 16, 17],
+                [14, 25, 18, 21],
+                [16, 29, 22, 23],
+                [20, 29, 24, 27],
+                [22, 29, 28, 29],
+            ],
         };
         Arc::new(Self::from_rectangles(rectangles))
     }
@@ -54,6 +79,7 @@ impl Terrain {
         let mut terrain = Self {
             walkable,
             is_far_from_walls: Vec::new(),
+            paths: None,
         };
         terrain.is_far_from_walls = (0..MAP_SIZE * MAP_SIZE)
             .map(|cell| {
@@ -61,6 +87,9 @@ impl Terrain {
                 (-1..=1).all(|dy| (-1..=1).all(|dx| terrain.is_walkable(x + dx, y + dy)))
             })
             .collect();
+        if rectangles.len() > 1 {
+            terrain.paths = Some(Paths::new(&terrain.walkable));
+        }
         terrain
     }
 
@@ -74,6 +103,50 @@ impl Terrain {
     #[must_use]
     pub fn walkable_cells(&self) -> usize {
         self.walkable.iter().filter(|walkable| **walkable).count()
+    }
+
+    /// Where a disc of `radius` at `from` heads next on its way to `to`: to `to` itself if nothing is between, else to the
+    /// farthest of the next cells of a shortest path that it can see.
+    #[must_use]
+    pub fn waypoint(&self, from: [f32; 2], to: [f32; 2], radius: f32) -> [f32; 2] {
+        let Some(paths) = &self.paths else { return to };
+        if self.is_clear(from, to, radius) {
+            return to;
+        }
+        let cell = |[x, y]: [f32; 2]| cell_index(cell_of(x), cell_of(y));
+        let (Some(mut here), Some(there)) = (cell(from), cell(to)) else {
+            return to;
+        };
+        let mut heading = None;
+        for _ in 0..LOOK_ALONG_PATH {
+            let Some(next) = paths.next(here, there) else {
+                break;
+            };
+            let centre = [next % MAP_SIZE, next / MAP_SIZE].map(|index| index as f32 + 0.5);
+            if heading.is_some() && !self.is_clear(from, centre, radius) {
+                break;
+            }
+            heading = Some(centre);
+            here = next;
+        }
+        heading.unwrap_or(to)
+    }
+
+    /// Whether a disc can go straight from `from` to `to`, looked at twice a map unit.
+    fn is_clear(&self, from: [f32; 2], to: [f32; 2], radius: f32) -> bool {
+        let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
+        let looks = (2.0 * (dx * dx + dy * dy).sqrt()).ceil().max(1.0);
+        // Touching a wall by a little is no obstacle: one slides along it.
+        let radius = 0.9 * radius;
+        let mut look = 1.0;
+        while look <= looks {
+            let (x, y) = (from[0] + dx * look / looks, from[1] + dy * look / looks);
+            if self.pushed_out_of_walls(x, y, radius) != (x, y) {
+                return false;
+            }
+            look += 1.0;
+        }
+        true
     }
 
     /// The point nearest to (`x`, `y`) where a disc of `radius` ≤ 1 touches no wall, as far as one correction per
@@ -95,6 +168,9 @@ impl Terrain {
         (x, y)
     }
 }
+
+/// Cells of a path that are looked along.
+const LOOK_ALONG_PATH: usize = 8;
 
 const NEIGHBOURS_FACES_FIRST: [(i32, i32); 9] = [
     (0, 0),
@@ -184,6 +260,23 @@ mod tests {
             let x = 5.0 + i as f32 * 0.04;
             assert_eq!(lane.pushed_out_of_walls(x, 8.2, 0.375), (x, 8.375));
         }
+    }
+
+    #[test]
+    fn a_way_leads_round_a_corner() {
+        let bend = Terrain::from_rectangles(&[[2, 5, 2, 20], [2, 20, 2, 5]]);
+        let (mut at, to) = ([3.5, 19.0], [19.0, 3.5]);
+        for _ in 0..80 {
+            let [x, y] = bend.waypoint(at, to, 0.375);
+            let (dx, dy) = (x - at[0], y - at[1]);
+            let part = (0.5 / (dx * dx + dy * dy).sqrt()).min(1.0);
+            let (x, y) = bend.pushed_out_of_walls(at[0] + dx * part, at[1] + dy * part, 0.375);
+            at = [x, y];
+        }
+        assert!(
+            (at[0] - to[0]).abs() + (at[1] - to[1]).abs() < 0.1,
+            "got to {at:?}"
+        );
     }
 
     #[test]

@@ -163,6 +163,14 @@ pub enum Delivery {
         /// Map units per second, > 0.
         speed: f32,
     },
+    /// By the attacker's own explosion, which it does not survive and which also comes when it is killed. It harms all units of
+    /// the other side that the weapon can hit, and no friends.
+    Burst {
+        /// Distance from the centre to a victim's edge, > 0.
+        radius: f32,
+        /// Damage to structures, instead of the weapon's own.
+        structure_damage: f32,
+    },
 }
 
 impl UnitTypes {
@@ -243,8 +251,8 @@ impl UnitType {
             &self.name,
         )?;
         require(
-            (0.0..=16.0).contains(&self.speed),
-            "speed is in [0, 16]",
+            (0.0..=4.0).contains(&self.speed),
+            "speed is in [0, 4]",
             &self.name,
         )?;
         let others = [
@@ -286,6 +294,14 @@ impl UnitType {
         )?;
         match weapon.delivery {
             Delivery::Instant => Ok(()),
+            Delivery::Burst {
+                radius,
+                structure_damage,
+            } => require(
+                (0.0..=16.0).contains(&radius) && is_magnitude(structure_damage),
+                "a burst's radius is in [0, 16] and its damage to structures ≥ 0",
+                &self.name,
+            ),
             Delivery::Missile { speed } => require(
                 speed >= 1.0 && speed.is_finite(),
                 "a missile's speed is ≥ 1",

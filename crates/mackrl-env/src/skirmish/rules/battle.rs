@@ -26,6 +26,8 @@ pub(super) struct Scratch {
     pub(super) footing: Vec<Footing>,
     /// Hits that land at the end of this loop.
     pub(super) hits: Vec<Hit>,
+    /// Units that explode at the end of this loop.
+    pub(super) exploding: Vec<usize>,
     /// Where units are about to be.
     pub(super) steps: Steps,
     /// Units that can be in each other's way.
@@ -59,7 +61,11 @@ impl Battle {
 
     /// Goes back (or forth) to `state`, which a battle on the same battlefield was in.
     pub fn restore(&mut self, state: &BattleState) {
-        self.state.clone_from(state);
+        self.state.x.clone_from(&state.x);
+        self.state.y.clone_from(&state.y);
+        self.state.units.clone_from(&state.units);
+        self.state.missiles.clone_from(&state.missiles);
+        self.state.blows.clone_from(&state.blows);
         self.reserve(self.state.units.len());
     }
 
@@ -123,6 +129,7 @@ impl Battle {
         self.state.missiles.reserve(4 * units);
         self.state.blows.reserve(4 * units);
         self.scratch.hits.reserve(4 * units);
+        self.scratch.exploding.reserve(units);
         self.scratch.destination.resize(units, None);
         self.scratch.footing.resize(units, Footing::Standing);
         self.scratch.steps.resize(units);

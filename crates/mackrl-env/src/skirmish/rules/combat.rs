@@ -6,7 +6,8 @@
 //! stands for the backswing.
 
 use crate::skirmish::rules::{
-    Battle, Battlefield, Blow, Chance, Missile, Order, Stance, Strike, UnitIndex, movement::Footing,
+    Battle, Battlefield, Blow, Chance, Missile, Order, Stance, Strike, UnitIndex,
+    movement::Footing, profile::Effect,
 };
 
 /// A hit that lands at the end of the loop.
@@ -26,7 +27,12 @@ impl Battle {
                 self.scratch.footing[index] = Footing::Gone;
                 continue;
             }
-            self.scratch.footing[index] = Footing::Standing;
+            let kind = usize::from(self.state.units[index].kind);
+            self.scratch.footing[index] = if field.profiles[kind].is_immobile() {
+                Footing::Braced
+            } else {
+                Footing::Standing
+            };
             self.tick(index);
             match self.target_of(index) {
                 Some(target) => self.fight(&field, index, usize::from(target), chance),
@@ -79,6 +85,7 @@ impl Battle {
         let waits = unit.stance == Stance::Aggressive && unit.backswing > 0.0;
         if let Order::Move { to } | Order::AttackMove { to } = unit.order
             && !waits
+            && !self.field.profiles[usize::from(unit.kind)].is_immobile()
         {
             let (x, y) = (self.state.x[index], self.state.y[index]);
             if [x, y] != to {
@@ -145,6 +152,10 @@ impl Battle {
     }
 
     fn take_effect(&mut self, index: usize, target: usize, strike: &Strike) {
+        if strike.burst_radius.is_some() {
+            self.scratch.exploding.push(index);
+            return;
+        }
         let (attacker, victim) = (small(index), small(target));
         if strike.missile_speed.is_some() {
             self.state.missiles.push(Missile {
@@ -224,23 +235,62 @@ impl Battle {
 
     /// Applies all hits of the loop at once: nobody is spared a hit because its attacker died in the same loop.
     pub(super) fn land_hits(&mut self) {
+        for index in 0..self.scratch.exploding.len() {
+            let unit = &mut self.state.units[self.scratch.exploding[index]];
+            (unit.life, unit.shield) = (0.0, 0.0);
+        }
         for index in 0..self.scratch.hits.len() {
-            let hit = self.scratch.hits[index];
-            let (attacker, target) = (usize::from(hit.attacker), usize::from(hit.target));
-            let attacker_kind = usize::from(self.state.units[attacker].kind);
-            let unit = &mut self.state.units[target];
-            let Some(strike) = &self.field.profiles[attacker_kind].strike else {
+            let Hit { target, attacker } = self.scratch.hits[index];
+            self.strike(usize::from(attacker), usize::from(target));
+        }
+        self.explode();
+        self.respond();
+        self.scratch.hits.clear();
+    }
+
+    /// One hit of the weapon of `attacker` on `target`. Who dies of it and can explode, will.
+    fn strike(&mut self, attacker: usize, target: usize) {
+        let profile = &self.field.profiles[usize::from(self.state.units[attacker].kind)];
+        let unit = &mut self.state.units[target];
+        let Some(strike) = &profile.strike else {
+            return;
+        };
+        if !unit.is_alive() {
+            return;
+        }
+        let effect = strike.effects[usize::from(unit.kind)];
+        (unit.shield, unit.life) = struck(unit.shield, unit.life, effect);
+        unit.unharmed = 0.0;
+        let own = &self.field.profiles[usize::from(unit.kind)].strike;
+        if !unit.is_alive() && own.as_ref().is_some_and(|own| own.burst_radius.is_some()) {
+            self.scratch.exploding.push(target);
+        }
+    }
+
+    /// Explosions of this loop, those that other explosions set off included.
+    fn explode(&mut self) {
+        let field = self.field.clone();
+        let mut next = 0;
+        while let Some(&index) = self.scratch.exploding.get(next) {
+            next += 1;
+            let unit = &self.state.units[index];
+            let Some(strike) = &field.profiles[usize::from(unit.kind)].strike else {
                 continue;
             };
-            let effect = strike.effects[usize::from(unit.kind)];
-            (unit.shield, unit.life) = struck(unit.shield, unit.life, effect);
-            unit.unharmed = 0.0;
+            let (team, radius) = (unit.team, strike.burst_radius.unwrap_or_default());
+            for victim in 0..self.state.units.len() {
+                let other = &self.state.units[victim];
+                let kind = usize::from(other.kind);
+                let reach = radius + field.profiles[kind].radius;
+                let is_harmed = other.team != team
+                    && strike.effects[kind].can_hit
+                    && self.state.distance_squared(index, victim) <= reach * reach;
+                if is_harmed {
+                    self.strike(index, victim);
+                }
+            }
         }
-        for index in 0..self.scratch.hits.len() {
-            let hit = self.scratch.hits[index];
-            self.respond(usize::from(hit.target), usize::from(hit.attacker));
-        }
-        self.scratch.hits.clear();
+        self.scratch.exploding.clear();
     }
 
     /// Recharges shields that were left alone long enough, and lets life grow back.
@@ -261,7 +311,7 @@ impl Battle {
 
 /// What a hit leaves of shield and life: the shield absorbs first, without armour; what is left of the hit meets the armour,
 /// and a hit does its least damage in any case.
-fn struck(shield: f32, life: f32, effect: super::profile::Effect) -> (f32, f32) {
+fn struck(shield: f32, life: f32, effect: Effect) -> (f32, f32) {
     if effect.damage <= shield {
         return (shield - effect.damage, life);
     }

@@ -41,7 +41,7 @@ pub(super) const LOOKAHEAD: f32 = 0.5;
 /// Loops for which a walker keeps the side on which it steps round.
 const DETOUR_LOOPS: u8 = 8;
 /// Rounds of pushing apart in a loop, at most.
-const PUSH_ROUNDS: usize = 3;
+const PUSH_ROUNDS: usize = 2;
 /// Map units that a round pushes a unit along an axis, at most.
 const GREATEST_PUSH: f32 = 0.07;
 /// Overlap in map units that is left alone.
@@ -76,15 +76,17 @@ impl Battle {
     }
 
     /// One walker's step, computed from the positions at the loop's beginning.
-    fn step_forward(&mut self, index: usize, [to_x, to_y]: [f32; 2]) {
+    fn step_forward(&mut self, index: usize, to: [f32; 2]) {
         let (x, y) = (self.state.x[index], self.state.y[index]);
+        let profile = &self.field.profiles[usize::from(self.state.units[index].kind)];
+        let terrain = &self.field.terrain;
+        let [to_x, to_y] = terrain.waypoint([x, y], to, profile.inner_radius);
         let (dx, dy) = (to_x - x, to_y - y);
         let distance = (dx * dx + dy * dy).sqrt();
         if distance == 0.0 {
             return;
         }
-        let speed = self.field.profiles[usize::from(self.state.units[index].kind)].speed;
-        let stride = speed.min(distance);
+        let stride = profile.speed.min(distance);
         let ahead = [dx / distance, dy / distance];
         let [way_x, way_y] = self.way_round(index, Wish { ahead, distance });
         self.scratch.steps.x[index] = x + way_x * stride;

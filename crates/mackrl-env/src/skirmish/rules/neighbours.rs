@@ -9,8 +9,8 @@ use crate::skirmish::rules::{BattleState, Battlefield, movement::LOOKAHEAD};
 /// Gap beyond which a pair is not listed, on top of the gap that movement asks about.
 const SKIN: f32 = 2.0;
 /// Distance that a unit may have moved before lists are renewed. In the loop that follows it moves by less than 0.25 for its
-/// stride and 3 · 0.1 for pushes, so that it is within half the skin of where it was listed.
-const RENEW_AT: f32 = 0.4;
+/// stride and 2 · 0.1 for pushes, so that it is within half the skin of where it was listed.
+const RENEW_AT: f32 = 0.5;
 
 /// Lists of near units, one behind the other.
 #[derive(Debug, Clone, Default)]

@@ -8,7 +8,8 @@ const LATTICE: f32 = 0.25;
 const REACH: i32 = 64;
 
 /// Finds places for units of the given profiles around a point: each takes the free place nearest to the point, so the first
-/// stands on it and the others surround it compactly. Equally near places are taken by ascending y, then x.
+/// stands on it and the others surround it compactly. Of equally near places those towards `front`, where the other side is,
+/// are taken first, then those of smaller y: armies that face each other stand as mirror images.
 ///
 /// The engine's own search is not known; this stands in for it. `taken` holds (x, y, separation radius) of everybody placed
 /// before and is extended.
@@ -17,14 +18,21 @@ const REACH: i32 = 64;
 #[must_use]
 pub fn spread_around(
     point: [f32; 2],
+    front: [f32; 2],
     profiles: &[&Profile],
     terrain: &Terrain,
     taken: &mut Vec<(f32, f32, f32)>,
 ) -> Option<Vec<[f32; 2]>> {
+    let forward = [front[0] - point[0], front[1] - point[1]];
+    let ahead = |dy: i32, dx: i32| dx as f32 * forward[0] + dy as f32 * forward[1];
     let mut offsets: Vec<(i32, i32)> = (-REACH..=REACH)
         .flat_map(|dy| (-REACH..=REACH).map(move |dx| (dy, dx)))
         .collect();
-    offsets.sort_by_key(|&(dy, dx)| (dx * dx + dy * dy, dy, dx));
+    offsets.sort_by(|a, b| {
+        let square = |(dy, dx): (i32, i32)| dx * dx + dy * dy;
+        let front_first = ahead(b.0, b.1).total_cmp(&ahead(a.0, a.1));
+        square(*a).cmp(&square(*b)).then(front_first).then(a.cmp(b))
+    });
     profiles
         .iter()
         .map(|profile| {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::skirmish::{
     terrain::Terrain,
-    unit_types::{Delivery, LOOPS_PER_SECOND, Plane, UnitType, UnitTypes},
+    unit_types::{Attribute, Delivery, LOOPS_PER_SECOND, Plane, UnitType, UnitTypes, Weapon},
 };
 
 /// What never changes during a battle.
@@ -72,6 +72,8 @@ pub struct Strike {
     pub hit_interval: f32,
     /// Map units that its missile flies in a loop, if it has one.
     pub missile_speed: Option<f32>,
+    /// Distance from its centre to a victim's edge at which the attacker's own explosion harms, if it explodes.
+    pub burst_radius: Option<f32>,
     /// Against each kind: whether it can be attacked, and what a hit does to shields and to life.
     pub effects: Vec<Effect>,
 }
@@ -133,19 +135,19 @@ impl Profile {
                 hits: weapon.hits,
                 hit_interval: weapon.hit_interval_s * loops,
                 missile_speed: match weapon.delivery {
-                    Delivery::Instant => None,
                     Delivery::Missile { speed } => Some(speed / loops),
+                    Delivery::Instant | Delivery::Burst { .. } => None,
+                },
+                burst_radius: match weapon.delivery {
+                    Delivery::Burst { radius, .. } => Some(radius),
+                    Delivery::Instant | Delivery::Missile { .. } => None,
                 },
                 effects: types
                     .iter()
                     .map(|target| Effect {
                         // No unit of these maps flies yet; those that do will say so in their file.
                         can_hit: weapon.targets.contains(&Plane::Ground),
-                        damage: weapon.damage
-                            + weapon
-                                .bonus
-                                .filter(|bonus| target.has(bonus.against))
-                                .map_or(0.0, |bonus| bonus.damage),
+                        damage: damage_of_hit(weapon, target),
                         armour: target.armour,
                         minimum: data.minimum_damage,
                     })
@@ -175,4 +177,17 @@ impl Strike {
         let reach = self.range + self.range_slop + own.radius + target.radius;
         reach * reach
     }
+}
+
+/// Damage of one hit of `weapon` on units of type `target`, before armour.
+fn damage_of_hit(weapon: &Weapon, target: &UnitType) -> f32 {
+    if let Delivery::Burst {
+        structure_damage, ..
+    } = weapon.delivery
+        && target.has(Attribute::Structure)
+    {
+        return structure_damage;
+    }
+    let bonus = weapon.bonus.filter(|bonus| target.has(bonus.against));
+    weapon.damage + bonus.map_or(0.0, |bonus| bonus.damage)
 }
