@@ -79,6 +79,16 @@ struct Choice {
     posterior: f32,
 }
 
+impl Choice {
+    /// The entry's column, and the gradient of the objective with respect to its log-probability.
+    fn weighted(&self, weight_bt: &[Vec<f32>]) -> (usize, f32) {
+        (
+            self.column,
+            self.posterior * weight_bt[self.environment][self.step],
+        )
+    }
+}
+
 impl ControllerMemory {
     pub(crate) fn new(controller: &Controller) -> Self {
         let sizes = controller.network.sizes();
@@ -262,12 +272,7 @@ impl ControllerMemory {
                     .take_while(|c| (c.step, c.row) == (step, row))
                     .count();
                 entries.clear();
-                entries.extend(rest[..own].iter().map(|choice| {
-                    (
-                        choice.column,
-                        choice.posterior * weight_bt[choice.environment][step],
-                    )
-                }));
+                entries.extend(rest[..own].iter().map(|choice| choice.weighted(weight_bt)));
                 rest = &rest[own..];
                 let (log_p, softmax_c) = tables.next().expect("every row has a table");
                 softmax.row_gradient(log_p, softmax_c, &entries, row_gradient);

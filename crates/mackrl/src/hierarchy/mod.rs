@@ -2,9 +2,9 @@
 //!
 //! | level | controller | reads | chooses |
 //! |---|---|---|---|
-//! | 1 | [pair selector](pair_selector) | common knowledge of the team | a partition into pairs |
-//! | 2 | [pair controller](pair_controller) | common knowledge of the pair, who they are | a joint action, or to delegate |
-//! | 3 | [agent controller](agent_controller) | its own observation and last action, who it is | its own action |
+//! | 1 | pair selector | common knowledge of the team | a partition into pairs |
+//! | 2 | pair controller | common knowledge of the pair, who they are | a joint action, or to delegate |
+//! | 3 | agent controller | its own observation and last action, who it is | its own action |
 //!
 //! All three write their log-probabilities into one table, with masks and exploration applied. The sampler and the marginal
 //! likelihood both read that table, so the probability that is differentiated is the one that was sampled from. The choice
