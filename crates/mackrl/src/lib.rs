@@ -30,3 +30,8 @@ pub mod training;
 
 pub use error::Error;
 pub use real::Real;
+
+/// Compiles and runs the examples of README.md.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct ReadmeExamples;
