@@ -22,7 +22,8 @@ use crate::{args::CertifyArgs, failure::Failure, output, reproduce::Meter, run_f
 /// Compares a trained team's central run with its agents in processes of their own, and fails if anything differs.
 pub(crate) fn run(args: &CertifyArgs) -> anyhow::Result<()> {
     let run = Run::open(&args.run)?;
-    let certificate = certify(&args.run, &run, args)?;
+    let certificate = certify(&args.run, &run, args)
+        .with_context(|| format!("cannot certify {}", args.run.display()))?;
     print(&certificate, args.json)
 }
 

@@ -1,5 +1,6 @@
 //! `mackrl evaluate`: how well a trained team plays.
 
+use anyhow::Context;
 use mackrl::training::evaluate;
 use serde::Serialize;
 use serde_json::Value;
@@ -12,7 +13,8 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     let seed = args.seed.unwrap_or(run.config.run.seed);
     let episodes = args.episodes.get();
     let threads = args.threads.count();
-    let evaluation = evaluate(&run.config, &run.weights, episodes, seed, threads)?;
+    let evaluation = evaluate(&run.config, &run.weights, episodes, seed, threads)
+        .with_context(|| format!("cannot evaluate {}", args.run.display()))?;
     print(&evaluation, args.json)
 }
 

@@ -151,7 +151,10 @@ pub(super) fn nearest<'a>(
     candidates
         .into_iter()
         .map(|candidate| (similarity(candidate), candidate))
-        .filter(|(similarity, _)| *similarity >= SIMILAR)
+        .filter(|(similarity, candidate)| {
+            // Names as short as `3m` are half different after one slip.
+            *similarity >= SIMILAR || strsim::damerau_levenshtein(name, candidate) <= 1
+        })
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, candidate)| candidate.to_owned())
 }
@@ -171,6 +174,11 @@ mod tests {
                 "{name}"
             );
         }
+    }
+
+    #[test]
+    fn one_slip_in_a_short_name_is_forgiven() {
+        assert_eq!(nearest("3n", ["8m", "3m", "2s3z"]).as_deref(), Some("3m"));
     }
 
     #[test]
