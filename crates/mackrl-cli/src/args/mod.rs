@@ -6,7 +6,7 @@ mod runs;
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::reproduce::figure5::Figure5Options;
+use crate::reproduce::{figure5::Figure5Options, figure6::Figure6Options};
 pub(crate) use bench::{BenchArgs, BenchCommand, BenchEnvironmentArgs};
 pub(crate) use configuration::ConfigurationArgs;
 pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, TrainArgs};
@@ -50,6 +50,7 @@ pub(crate) struct ReproduceArgs {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Figure {
     Figure5(Figure5Options),
+    Figure6(Figure6Options),
 }
 
 /// List the maps that can be played, with the sizes of their arrays

@@ -3,12 +3,13 @@
 use crate::{
     args::{Figure, ReproduceArgs},
     output,
-    reproduce::{Meter, figure5},
+    reproduce::{Meter, figure5, figure6},
 };
 
 pub(crate) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
     match &args.figure {
         Figure::Figure5(options) => figure5(options),
+        Figure::Figure6(options) => figure6(options),
     }
 }
 
@@ -16,6 +17,16 @@ fn figure5(options: &figure5::Figure5Options) -> anyhow::Result<()> {
     let meter = Meter::new("runs");
     let report = figure5::run(options, &|done, total| meter.report(done, total))?;
     if options.json {
+        output::print_json(&report)
+    } else {
+        output::print(&report.to_string())
+    }
+}
+
+fn figure6(options: &figure6::Figure6Options) -> anyhow::Result<()> {
+    let meter = Meter::new("thousand steps");
+    let report = figure6::run(options, &|done, total| meter.report(done, total))?;
+    if options.learning.json {
         output::print_json(&report)
     } else {
         output::print(&report.to_string())

@@ -3,10 +3,8 @@
 use mackrl::tabular::{Learner, Run};
 use mackrl_env::matrix_game::{CommonKnowledge, ObservationDistribution};
 
-use super::{
-    findings::{EQUAL, ERRORS, Findings, NEAR, ROUNDING, mean, name, range},
-    report::{Claim, ClaimSource},
-};
+use super::findings::{EQUAL, ERRORS, Findings, NEAR, ROUNDING, mean, name, range};
+use crate::reproduce::{Claim, ClaimSource};
 
 /// Judges every claim.
 pub(super) fn claims(findings: &Findings<'_>) -> Vec<Claim> {

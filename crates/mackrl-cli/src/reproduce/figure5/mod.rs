@@ -12,7 +12,7 @@ mod published;
 mod report;
 mod table;
 
-use std::{fs, path::Path};
+use std::fs;
 
 use anyhow::Context as _;
 use mackrl::tabular::{Learner, SweepSettings, TabularGame, optima, sweep};
@@ -22,6 +22,8 @@ pub(crate) use report::Figure5Report;
 
 use findings::Findings;
 use report::Delegation;
+
+use super::write;
 
 /// Probabilities of common knowledge, as published.
 fn points() -> Vec<f64> {
@@ -80,14 +82,6 @@ fn compute(
         delegation: Delegation::measured(&sweep, distribution, &points),
     };
     Ok(Figure5Report::new(options, findings))
-}
-
-/// Writes a file whole: a reader finds the old one or the new one, never a part.
-fn write(folder: &Path, name: &str, bytes: &[u8]) -> anyhow::Result<()> {
-    let path = folder.join(name);
-    let unfinished = folder.join(format!("{name}.tmp"));
-    fs::write(&unfinished, bytes).with_context(|| format!("writing {}", unfinished.display()))?;
-    fs::rename(&unfinished, &path).with_context(|| format!("writing {}", path.display()))
 }
 
 #[cfg(test)]

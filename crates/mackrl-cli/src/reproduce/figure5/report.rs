@@ -5,6 +5,7 @@ use mackrl_env::matrix_game::{CommonKnowledge, ObservationDistribution, Payoffs}
 use serde::{Deserialize, Serialize};
 
 use super::{claims::claims, findings::Findings, options::Figure5Options};
+use crate::reproduce::Claim;
 
 /// Figure 5 in numbers.
 ///
@@ -121,29 +122,6 @@ pub(crate) struct StateDelegation {
     pub(crate) mean: Vec<Option<f64>>,
     /// Standard error of the mean.
     pub(crate) sem: Vec<Option<f64>>,
-}
-
-/// A statement and whether it holds.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Claim {
-    /// The statement.
-    pub(crate) claim: String,
-    /// Who makes it.
-    pub(crate) source: ClaimSource,
-    /// The verdict.
-    pub(crate) holds: bool,
-    /// The rule and the numbers.
-    pub(crate) evidence: String,
-}
-
-/// Who makes a claim.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub(crate) enum ClaimSource {
-    /// The paper's text.
-    Paper,
-    /// This project, about the paper's figure or the game.
-    Reproduction,
 }
 
 impl Quantity {

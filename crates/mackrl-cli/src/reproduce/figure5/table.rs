@@ -6,11 +6,8 @@ use mackrl::tabular::{Curve, Learner};
 
 use super::{
     findings::name,
-    report::{Claim, ClaimSource, Figure5Report, Quantity, StateDelegation},
+    report::{Figure5Report, Quantity, StateDelegation},
 };
-
-/// Columns of a terminal that evidence is broken to.
-const COLUMNS: usize = 100;
 
 impl Display for Figure5Report {
     fn fmt(&self, out: &mut Formatter<'_>) -> Result {
@@ -27,9 +24,7 @@ impl Display for Figure5Report {
         self.write_curves(out)?;
         self.write_delegation(out)?;
         writeln!(out, "Verdicts")?;
-        self.claims
-            .iter()
-            .try_for_each(|claim| write_claim(claim, out))
+        self.claims.iter().try_for_each(|claim| claim.write(out))
     }
 }
 
@@ -90,47 +85,10 @@ impl Figure5Report {
     }
 }
 
-fn write_claim(claim: &Claim, out: &mut Formatter<'_>) -> Result {
-    let verdict = if claim.holds {
-        "holds        "
-    } else {
-        "does not hold"
-    };
-    let source = match claim.source {
-        ClaimSource::Paper => "paper",
-        ClaimSource::Reproduction => "ours ",
-    };
-    let mut heading = format!("  {verdict}  {source}  ");
-    let indent = " ".repeat(heading.chars().count());
-    for line in wrapped(&claim.claim, COLUMNS - indent.len()) {
-        writeln!(out, "{heading}{line}")?;
-        heading.clone_from(&indent);
-    }
-    for line in wrapped(&claim.evidence, COLUMNS - 6) {
-        writeln!(out, "      {line}")?;
-    }
-    Ok(())
-}
-
 fn entry(curve: &Curve, point: usize) -> String {
     format!("{:.3} ± {:.3}", curve.mean[point], curve.sem[point])
 }
 
 fn number(value: Option<f64>) -> String {
     value.map_or_else(|| "–".into(), |value| format!("{value:.3}"))
-}
-
-/// Breaks `text` at spaces into lines of at most `columns` characters, unless a word is longer.
-fn wrapped(text: &str, columns: usize) -> Vec<String> {
-    let mut lines: Vec<String> = Vec::new();
-    for word in text.split_whitespace() {
-        match lines.last_mut() {
-            Some(line) if line.chars().count() + 1 + word.chars().count() <= columns => {
-                line.push(' ');
-                line.push_str(word);
-            }
-            _ => lines.push(word.into()),
-        }
-    }
-    lines
 }

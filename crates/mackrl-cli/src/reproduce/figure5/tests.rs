@@ -2,7 +2,8 @@ use std::num::NonZeroUsize;
 
 use clap::Parser;
 
-use super::{report::Claim, *};
+use super::*;
+use crate::reproduce::Claim;
 
 #[derive(Parser)]
 struct CommandLine {
