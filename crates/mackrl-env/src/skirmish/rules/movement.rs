@@ -93,20 +93,14 @@ impl Battle {
         self.scratch.steps.y[index] = y + way_y * stride;
     }
 
-    /// The unit vector along which a walker goes: towards its destination if nothing blocks it, else the tangent, on the side
-    /// that it is passing, of the obstacle that turns it the most.
+    /// The unit vector along which a walker goes: towards its destination if nothing blocks it, else the tangent of the
+    /// obstacle that turns it the most, on the side where that is less; if both sides are equal, towards greater y. All
+    /// obstacles are looked at before a side is chosen, so that the order of units in the arrays is of no consequence.
     fn way_round(&mut self, index: usize, wish: Wish) -> [f32; 2] {
         let (state, neighbours) = (&mut self.state, &self.scratch.neighbours);
         let (x, y) = (state.x[index], state.y[index]);
-        let unit = &mut state.units[index];
-        unit.detour_loops = unit.detour_loops.saturating_sub(1);
-        let mut side = if unit.detour_loops > 0 {
-            f32::from(unit.detour)
-        } else {
-            0.0
-        };
-        let mut way = wish.ahead;
-        let mut turned = 1.0;
+        // Per side, left and right: the obstacle that turns the walker the most, and the cosine of the turn.
+        let mut tangents = [(wish.ahead, 1.0_f32); 2];
         for &other in neighbours.of(index) {
             let other = usize::from(other);
             if !blocks(
@@ -119,28 +113,31 @@ impl Battle {
             let Some(across) = wish.obstructed(toward, neighbours.touch(index, other)) else {
                 continue;
             };
-            if side == 0.0 {
-                // Pass on the side where less of the obstacle is; if it is straight ahead, towards greater y.
-                let left = if across == 0.0 {
-                    wish.ahead[0] >= 0.0
-                } else {
-                    across < 0.0
-                };
-                side = if left { 1.0 } else { -1.0 };
-            }
             let square = toward[0] * toward[0] + toward[1] * toward[1];
-            let scale = side / square.max(1e-12).sqrt();
-            let tangent = [-toward[1] * scale, toward[0] * scale];
-            let along = tangent[0] * wish.ahead[0] + tangent[1] * wish.ahead[1];
-            if along < turned {
-                (way, turned) = (tangent, along);
+            let scale = 1.0 / square.max(1e-12).sqrt();
+            for (tangent, side) in tangents.iter_mut().zip([scale, -scale]) {
+                let along = -across * side;
+                if along < tangent.1 {
+                    *tangent = ([-toward[1] * side, toward[0] * side], along);
+                }
             }
         }
-        if turned < 1.0 {
-            unit.detour = if side > 0.0 { 1 } else { -1 };
-            unit.detour_loops = DETOUR_LOOPS;
+        let unit = &mut state.units[index];
+        unit.detour_loops = unit.detour_loops.saturating_sub(1);
+        let [left, right] = tangents;
+        if left.1 == 1.0 && right.1 == 1.0 {
+            return wish.ahead;
         }
-        way
+        let goes_left = if unit.detour_loops > 0 {
+            unit.detour > 0
+        } else if left.1 == right.1 {
+            wish.ahead[0] >= 0.0
+        } else {
+            left.1 > right.1
+        };
+        unit.detour = if goes_left { 1 } else { -1 };
+        unit.detour_loops = DETOUR_LOOPS;
+        if goes_left { left.0 } else { right.0 }
     }
 
     /// Pushes overlapping units apart once; returns whether any overlapped.

@@ -24,7 +24,8 @@ pub fn spread_around(
     taken: &mut Vec<(f32, f32, f32)>,
 ) -> Option<Vec<[f32; 2]>> {
     let forward = [front[0] - point[0], front[1] - point[1]];
-    let ahead = |dy: i32, dx: i32| dx as f32 * forward[0] + dy as f32 * forward[1];
+    // Adding zero turns −0 into 0, so that places beside the point are equally far ahead for either army.
+    let ahead = |dy: i32, dx: i32| dx as f32 * forward[0] + dy as f32 * forward[1] + 0.0;
     let mut offsets: Vec<(i32, i32)> = (-REACH..=REACH)
         .flat_map(|dy| (-REACH..=REACH).map(move |dx| (dy, dx)))
         .collect();

@@ -1,0 +1,45 @@
+//! A battle is its state: nothing else is remembered.
+
+use super::*;
+
+#[test]
+fn a_battle_restored_at_any_loop_goes_on_to_the_same_bits() {
+    let mut arena = Arena::on(TerrainName::Lane, [-0.0625, 0.125]);
+    for i in 0..9_u8 {
+        let y = 14.0 + f32::from(i) * 0.8;
+        let ally = arena.add(
+            if i % 2 == 0 { "marine" } else { "stalker" },
+            Ally,
+            Aggressive,
+            [9.0, y],
+        );
+        let enemy = arena.add("zealot", Enemy, Aggressive, [20.0, y - 2.0]);
+        arena
+            .battle
+            .order(ally, Order::AttackMove { to: [23.0, 16.0] });
+        arena
+            .battle
+            .order(enemy, Order::AttackMove { to: [9.0, 16.0] });
+    }
+    let mut other = arena.battle.clone();
+    for number in 0..400 {
+        let state = other.state().clone();
+        other.restore(&state);
+        let mut chance = arena.chance.clone();
+        arena.loops(1);
+        other.advance(&mut chance);
+        assert!(arena.battle.state == other.state, "loop {number} differs");
+        assert_eq!(arena.battle.state.hash(), other.state.hash());
+    }
+    let dead = arena
+        .battle
+        .state
+        .units
+        .iter()
+        .filter(|unit| !unit.is_alive())
+        .count();
+    assert!(
+        dead > 5,
+        "only {dead} died: too tame a battle to show anything"
+    );
+}
