@@ -190,9 +190,6 @@ impl ControllerMemory {
         exploration: f32,
     ) {
         self.exploration = exploration;
-        if self.rows == 0 {
-            return;
-        }
         controller.network.step(weights, &mut self.trace);
         let columns = self.sizes.outputs;
         let place = self.first_row * columns..(self.first_row + self.rows) * columns;
@@ -278,11 +275,9 @@ impl ControllerMemory {
                 softmax.row_gradient(log_p, softmax_c, &entries, row_gradient);
             }
         }
-        if self.first_row + self.rows > 0 {
-            controller
-                .network
-                .backward(weights, &mut self.trace, gradient);
-        }
+        controller
+            .network
+            .backward(weights, &mut self.trace, gradient);
     }
 
     const fn softmax(&self) -> MaskedLogSoftmax<f32> {

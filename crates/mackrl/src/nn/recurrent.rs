@@ -117,6 +117,9 @@ impl RecurrentNetwork {
         } = trace.sizes;
         let range = trace.last_rows();
         let (first, rows) = (range.start, range.len());
+        if rows == 0 {
+            return;
+        }
         let x = &trace.inputs.as_slice()[first * inputs..];
         let features = &mut trace.features.as_mut_slice()[first * hidden..][..rows * hidden];
         self.input.forward(&weights.input, rows, x, features);
@@ -166,10 +169,15 @@ impl RecurrentNetwork {
                 .features_gradient
                 .grow(rows.len() * trace.sizes.hidden);
             for t in block.clone().rev() {
-                self.step_backward(weights, trace, t, rows.start);
+                // Behind a step without rows there may be no room that kernels could look at.
+                if !trace.steps[t].rows.is_empty() {
+                    self.step_backward(weights, trace, t, rows.start);
+                }
                 trace.carry_gradient_back(t);
             }
-            self.parameter_gradient(trace, rows, gradient);
+            if !rows.is_empty() {
+                self.parameter_gradient(trace, rows, gradient);
+            }
             end = block.start;
         }
     }

@@ -92,6 +92,11 @@ fn network_gradient_is_right_where_rows_leave() {
 }
 
 #[test]
+fn network_gradient_is_right_where_no_row_is_left_at_the_end() {
+    check_episode(&[(3, None), (3, None), (0, Some(vec![])), (0, None)]);
+}
+
+#[test]
 fn network_gradient_is_right_where_two_rows_continue_one() {
     check_episode(&[(2, None), (3, Some(vec![1, 1, 0])), (1, None)]);
 }
