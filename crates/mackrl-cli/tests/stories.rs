@@ -56,6 +56,8 @@ fn help_teaches_every_command() {
         "evaluate",
         "certify",
         "reproduce figure5",
+        "reproduce figure6",
+        "reproduce figure7",
         "maps",
         "config",
         "bench env",

@@ -6,7 +6,7 @@ mod runs;
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::reproduce::{figure5::Figure5Options, figure6::Figure6Options};
+use crate::reproduce::{figure5::Figure5Options, figure6::Figure6Options, figure7::Figure7Options};
 pub(crate) use bench::{BenchArgs, BenchCommand, BenchEnvironmentArgs};
 pub(crate) use configuration::ConfigurationArgs;
 pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, TrainArgs};
@@ -51,6 +51,7 @@ pub(crate) struct ReproduceArgs {
 pub(crate) enum Figure {
     Figure5(Figure5Options),
     Figure6(Figure6Options),
+    Figure7(Figure7Options),
 }
 
 /// List the maps that can be played, with the sizes of their arrays

@@ -3,6 +3,7 @@
 mod claim;
 pub(crate) mod figure5;
 pub(crate) mod figure6;
+pub(crate) mod figure7;
 mod learning;
 mod meter;
 

@@ -46,7 +46,7 @@ pub(crate) struct LearningOptions {
 
     /// Runs side by side, each on one thread; changes no result. [default: one for each processor]
     #[arg(long, value_name = "K")]
-    jobs: Option<NonZeroUsize>,
+    pub(crate) jobs: Option<NonZeroUsize>,
 
     /// Print the report as JSON instead of a table.
     #[arg(long)]
@@ -78,5 +78,20 @@ impl LearningOptions {
             "mackrl reproduce {figure} --seeds {} --steps {} --interval {}",
             self.seeds, self.steps, self.interval
         )
+    }
+}
+
+#[cfg(test)]
+impl Default for LearningOptions {
+    fn default() -> Self {
+        Self {
+            out: PathBuf::new(),
+            seeds: 2,
+            steps: 1_000,
+            interval: 1_000,
+            quick: false,
+            jobs: None,
+            json: false,
+        }
     }
 }
