@@ -176,6 +176,12 @@ impl Terrain {
         cell_index(x, y).is_some_and(|cell| self.walkable[cell])
     }
 
+    /// Whether a cell belongs to the map.
+    #[must_use]
+    pub fn is_inside(x: i32, y: i32) -> bool {
+        cell_index(x, y).is_some()
+    }
+
     /// Number of walkable cells.
     #[must_use]
     pub fn walkable_cells(&self) -> usize {
