@@ -43,15 +43,11 @@ fn every_registered_environment_keeps_the_contract() {
 
 #[test]
 fn maps_have_the_sizes_of_smac() {
-    for name in ["3m", "8m", "5m_vs_6m", "2s3z"] {
-        assert!(registry::names().contains(&name), "{name} is missing");
-    }
+    let names: Vec<&str> = TABLE.iter().map(|(name, _)| *name).collect();
+    assert_eq!(registry::names(), names);
     for (name, sizes) in TABLE {
-        let environment = match registry::make(name, &SkirmishSettings::default()) {
-            Ok(environment) => environment,
-            Err(MakeError::UnknownName { .. }) => continue,
-            Err(error) => panic!("{name}: {error}"),
-        };
+        let environment = registry::make(name, &SkirmishSettings::default())
+            .unwrap_or_else(|error| panic!("{name}: {error}"));
         let spec = environment.spec();
         let found = [
             spec.agents,
@@ -62,6 +58,105 @@ fn maps_have_the_sizes_of_smac() {
             spec.episode_limit,
         ];
         assert_eq!(found, *sizes, "{name}");
+    }
+}
+
+#[test]
+fn every_option_keeps_the_contract_and_changes_sizes_as_smac_says() {
+    let default = SkirmishSettings::default;
+    // Changes of the sizes of an observation and of the state of MMM: 10 agents, 10 enemies, 3 type bits, no shields.
+    let options = [
+        (
+            "obs_own_health",
+            SkirmishSettings {
+                obs_own_health: false,
+                ..default()
+            },
+            159,
+            290,
+        ),
+        (
+            "obs_all_health",
+            SkirmishSettings {
+                obs_all_health: false,
+                ..default()
+            },
+            141,
+            290,
+        ),
+        (
+            "obs_pathing_grid",
+            SkirmishSettings {
+                obs_pathing_grid: true,
+                ..default()
+            },
+            168,
+            290,
+        ),
+        (
+            "obs_terrain_height",
+            SkirmishSettings {
+                obs_terrain_height: true,
+                ..default()
+            },
+            169,
+            290,
+        ),
+        (
+            "obs_timestep_number",
+            SkirmishSettings {
+                obs_timestep_number: true,
+                ..default()
+            },
+            161,
+            290,
+        ),
+        (
+            "obs_last_action",
+            SkirmishSettings {
+                obs_last_action: true,
+                ..default()
+            },
+            304,
+            290,
+        ),
+        (
+            "state_last_action",
+            SkirmishSettings {
+                state_last_action: false,
+                ..default()
+            },
+            160,
+            130,
+        ),
+        (
+            "state_timestep_number",
+            SkirmishSettings {
+                state_timestep_number: true,
+                ..default()
+            },
+            160,
+            291,
+        ),
+        (
+            "obs_instead_of_state",
+            SkirmishSettings {
+                obs_instead_of_state: true,
+                ..default()
+            },
+            160,
+            1600,
+        ),
+    ];
+    for (option, settings, observation, state) in options {
+        let mut environment = registry::make("MMM", &settings).unwrap();
+        let spec = environment.spec();
+        assert_eq!(
+            (spec.observation_size, spec.state_size),
+            (observation, state),
+            "{option}"
+        );
+        check_environment(environment.as_mut(), 1);
     }
 }
 

@@ -133,9 +133,10 @@ fn check_bodies(skirmish: &Skirmish, was_alive: &mut [bool]) {
         );
         was_alive[index] = unit.is_alive();
         let (x, y) = (state.x[index], state.y[index]);
-        let (free_x, free_y) = field
-            .terrain
-            .pushed_out_of_walls(x, y, profile.inner_radius - 0.01);
+        let Some(terrain) = field.terrain.for_layer(profile.layer) else {
+            continue;
+        };
+        let (free_x, free_y) = terrain.pushed_out_of_walls(x, y, profile.inner_radius - 0.01);
         assert!(
             (free_x - x).abs() + (free_y - y).abs() < 1e-4,
             "{name}: unit {index} is in a wall at {x}, {y}"

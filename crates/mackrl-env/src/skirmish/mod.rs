@@ -16,7 +16,7 @@ pub mod terrain;
 pub mod unit_types;
 
 pub use error::SkirmishError;
-pub use face::{Skirmish, SkirmishKnowledge};
+pub use face::{BattleTally, Skirmish, SkirmishKnowledge};
 pub use scenario::Scenario;
 pub use settings::{Compatibility, SkirmishSettings};
 pub use speed::{Speed, measure_speed};

@@ -28,6 +28,8 @@ const MAPS: &[(&str, &str)] = &[
         "27m_vs_30m",
         include_str!("../../../../maps/27m_vs_30m.toml"),
     ),
+    ("MMM", include_str!("../../../../maps/MMM.toml")),
+    ("MMM2", include_str!("../../../../maps/MMM2.toml")),
     ("2s3z", include_str!("../../../../maps/2s3z.toml")),
     ("3s5z", include_str!("../../../../maps/3s5z.toml")),
     (
@@ -37,7 +39,9 @@ const MAPS: &[(&str, &str)] = &[
     ("3s_vs_3z", include_str!("../../../../maps/3s_vs_3z.toml")),
     ("3s_vs_4z", include_str!("../../../../maps/3s_vs_4z.toml")),
     ("3s_vs_5z", include_str!("../../../../maps/3s_vs_5z.toml")),
+    ("1c3s5z", include_str!("../../../../maps/1c3s5z.toml")),
     ("2m_vs_1z", include_str!("../../../../maps/2m_vs_1z.toml")),
+    ("corridor", include_str!("../../../../maps/corridor.toml")),
     ("6h_vs_8z", include_str!("../../../../maps/6h_vs_8z.toml")),
     ("2s_vs_1sc", include_str!("../../../../maps/2s_vs_1sc.toml")),
     (
@@ -47,6 +51,10 @@ const MAPS: &[(&str, &str)] = &[
     (
         "bane_vs_bane",
         include_str!("../../../../maps/bane_vs_bane.toml"),
+    ),
+    (
+        "2c_vs_64zg",
+        include_str!("../../../../maps/2c_vs_64zg.toml"),
     ),
 ];
 

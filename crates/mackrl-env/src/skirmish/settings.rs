@@ -50,8 +50,22 @@ pub struct SkirmishSettings {
     pub reward_sparse: bool,
     /// Whether agents see the last action of the allies they see.
     pub obs_last_action: bool,
+    /// Whether agents see their own life and shield.
+    pub obs_own_health: bool,
+    /// Whether agents see the life and shields of those in sight.
+    pub obs_all_health: bool,
+    /// Whether agents see at eight points around them whether one can walk there.
+    pub obs_pathing_grid: bool,
+    /// Whether agents see the height of the ground at these points and below them.
+    pub obs_terrain_height: bool,
+    /// Whether agents see which part of the episode's limit has passed.
+    pub obs_timestep_number: bool,
+    /// Whether the state is the agents' observations, one behind the other.
+    pub obs_instead_of_state: bool,
     /// Whether the state holds every agent's last action.
     pub state_last_action: bool,
+    /// Whether the state holds which part of the episode's limit has passed.
+    pub state_timestep_number: bool,
 }
 
 impl Default for SkirmishSettings {
@@ -72,7 +86,14 @@ impl Default for SkirmishSettings {
             reward_negative_scale: 0.5,
             reward_sparse: false,
             obs_last_action: false,
+            obs_own_health: true,
+            obs_all_health: true,
+            obs_pathing_grid: false,
+            obs_terrain_height: false,
+            obs_timestep_number: false,
+            obs_instead_of_state: false,
             state_last_action: true,
+            state_timestep_number: false,
         }
     }
 }

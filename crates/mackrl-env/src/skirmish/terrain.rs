@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use crate::skirmish::paths::Paths;
+use crate::skirmish::{paths::Paths, unit_types::Layer};
 
 /// Edge of the square map in map units and cells.
 pub const MAP_SIZE: usize = 32;
@@ -30,14 +30,24 @@ pub enum TerrainName {
     Arena2s,
     /// A broad way from one corner to the other.
     WindingSlope,
+    /// Two rooms joined by a choke in which nobody stands abreast.
+    Corridor,
+    /// Lower ground below a plateau, with a ramp at either end of the cliff.
+    Plateau,
 }
 
 /// A walkability grid and what movement derives from it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Terrain {
-    /// Whether a cell is walkable, index `y * MAP_SIZE + x`.
+    /// Whether the map flags a cell as walkable, index `y * MAP_SIZE + x`: what agents are told.
     walkable: Vec<bool>,
-    /// Whether a cell and its eight neighbours are walkable, so that no wall is near.
+    /// Where units really walk: flagged cells, and those that diagonal walls leave open.
+    passable: Vec<bool>,
+    /// Cliff level of the ground, 0 where nobody walks.
+    level: Vec<u8>,
+    /// The terrain of units that walk over cliffs, if it differs.
+    over_cliffs: Option<Arc<Self>>,
+    /// Whether a cell and its eight neighbours are passable, so that no wall is near.
     is_far_from_walls: Vec<bool>,
     /// Ways round corners, where there are corners.
     paths: Option<Paths>,
@@ -65,38 +75,111 @@ impl Terrain {
                 [20, 29, 24, 27],
                 [22, 29, 28, 29],
             ],
+            TerrainName::Corridor => &[
+                [2, 11, 2, 11],
+                [12, 13, 12, 13],
+                [14, 25, 14, 15],
+                [14, 27, 16, 17],
+                [12, 29, 18, 21],
+                [14, 29, 22, 23],
+                [16, 29, 24, 25],
+                [18, 29, 26, 27],
+                [20, 29, 28, 29],
+            ],
+            TerrainName::Plateau => &[
+                [4, 27, 6, 7],
+                [2, 29, 8, 9],
+                [0, 31, 10, 11],
+                [0, 3, 12, 13],
+                [28, 31, 12, 13],
+                [0, 31, 14, 15],
+                [2, 29, 16, 17],
+                [8, 23, 18, 19],
+            ],
         };
-        Arc::new(Self::from_rectangles(rectangles))
+        let mut terrain = Self::from_rectangles(rectangles);
+        match name {
+            TerrainName::Corridor => terrain.open(&CORRIDOR_DIAGONALS),
+            TerrainName::Plateau => {
+                let mut over_cliffs = terrain.clone();
+                over_cliffs.open(&[PLATEAU_CLIFF]);
+                terrain.over_cliffs = Some(Arc::new(over_cliffs));
+                fill(&mut terrain.level, PLATEAU_TOP, |level| *level *= 2);
+            }
+            _ => {}
+        }
+        Arc::new(terrain)
     }
 
     fn from_rectangles(rectangles: &[[usize; 4]]) -> Self {
         let mut walkable = vec![false; MAP_SIZE * MAP_SIZE];
-        for &[x_first, x_last, y_first, y_last] in rectangles {
-            for y in y_first..=y_last {
-                walkable[y * MAP_SIZE + x_first..=y * MAP_SIZE + x_last].fill(true);
-            }
+        for rectangle in rectangles {
+            fill(&mut walkable, *rectangle, |cell| *cell = true);
         }
         let mut terrain = Self {
+            passable: walkable.clone(),
+            level: walkable.iter().map(|cell| u8::from(*cell)).collect(),
             walkable,
+            over_cliffs: None,
             is_far_from_walls: Vec::new(),
             paths: None,
         };
-        terrain.is_far_from_walls = (0..MAP_SIZE * MAP_SIZE)
-            .map(|cell| {
-                let (x, y) = (signed(cell % MAP_SIZE), signed(cell / MAP_SIZE));
-                (-1..=1).all(|dy| (-1..=1).all(|dx| terrain.is_walkable(x + dx, y + dy)))
-            })
-            .collect();
+        terrain.survey();
         if rectangles.len() > 1 {
-            terrain.paths = Some(Paths::new(&terrain.walkable));
+            terrain.paths = Some(Paths::new(&terrain.passable));
         }
         terrain
+    }
+
+    /// Lets units walk on cells that the map does not flag as walkable.
+    fn open(&mut self, rectangles: &[[usize; 4]]) {
+        for rectangle in rectangles {
+            fill(&mut self.passable, *rectangle, |cell| *cell = true);
+        }
+        self.survey();
+        self.paths = Some(Paths::new(&self.passable));
+    }
+
+    /// Finds the cells that no wall is near.
+    fn survey(&mut self) {
+        self.is_far_from_walls = (0..MAP_SIZE * MAP_SIZE)
+            .map(|cell| {
+                let (x, y) = (signed(cell % MAP_SIZE), signed(cell / MAP_SIZE));
+                (-1..=1).all(|dy| (-1..=1).all(|dx| self.is_passable(x + dx, y + dy)))
+            })
+            .collect();
+    }
+
+    /// The terrain as units of `layer` find it; `None` for those that fly over everything.
+    #[must_use]
+    pub fn for_layer(&self, layer: Layer) -> Option<&Self> {
+        match layer {
+            Layer::Ground => Some(self),
+            Layer::Tall => Some(self.over_cliffs.as_deref().unwrap_or(self)),
+            Layer::Air => None,
+        }
+    }
+
+    /// Cliff level of a cell over 2, in \[0, 1\]; 0 where nobody walks, 1 outside the map.
+    #[must_use]
+    pub fn height(&self, x: i32, y: i32) -> f32 {
+        cell_index(x, y).map_or(1.0, |cell| f32::from(self.level[cell]) / 2.0)
+    }
+
+    fn is_passable(&self, x: i32, y: i32) -> bool {
+        cell_index(x, y).is_some_and(|cell| self.passable[cell])
     }
 
     /// Whether the cell with corner (`x`, `y`) is inside the map and walkable.
     #[must_use]
     pub fn is_walkable(&self, x: i32, y: i32) -> bool {
         cell_index(x, y).is_some_and(|cell| self.walkable[cell])
+    }
+
+    /// Whether a cell belongs to the map.
+    #[must_use]
+    pub fn is_inside(x: i32, y: i32) -> bool {
+        cell_index(x, y).is_some()
     }
 
     /// Number of walkable cells.
@@ -149,19 +232,25 @@ impl Terrain {
         true
     }
 
+    /// The point of the map nearest to (`x`, `y`).
+    #[must_use]
+    pub fn within_map(x: f32, y: f32) -> (f32, f32) {
+        let edge = MAP_SIZE as f32 - 0.01;
+        (x.clamp(0.01, edge), y.clamp(0.01, edge))
+    }
+
     /// The point nearest to (`x`, `y`) where a disc of `radius` ≤ 1 touches no wall, as far as one correction per
     /// neighbouring cell finds it.
     #[must_use]
     pub fn pushed_out_of_walls(&self, x: f32, y: f32, radius: f32) -> (f32, f32) {
-        let edge = MAP_SIZE as f32 - 0.01;
-        let (mut x, mut y) = (x.clamp(0.01, edge), y.clamp(0.01, edge));
+        let (mut x, mut y) = Self::within_map(x, y);
         let (cell_x, cell_y) = (cell_of(x), cell_of(y));
         if cell_index(cell_x, cell_y).is_some_and(|cell| self.is_far_from_walls[cell]) {
             return (x, y);
         }
         // Faces before corners: a wall of several cells must not catch a unit at the seams between them.
         for (dx, dy) in NEIGHBOURS_FACES_FIRST {
-            if !self.is_walkable(cell_x + dx, cell_y + dy) {
+            if !self.is_passable(cell_x + dx, cell_y + dy) {
                 (x, y) = pushed_out_of_cell(x, y, radius, cell_x + dx, cell_y + dy);
             }
         }
@@ -169,6 +258,22 @@ impl Terrain {
     }
 }
 
+/// Cells beside the choke of the corridor that its walls, which run at 45°, leave open. The map's blocks of 2 × 2 cells touch
+/// at corners only; half a block each is ground.
+const CORRIDOR_DIAGONALS: [[usize; 4]; 8] = [
+    [12, 12, 10, 11],
+    [13, 13, 11, 11],
+    [10, 11, 12, 12],
+    [11, 11, 13, 13],
+    [14, 14, 12, 13],
+    [15, 15, 13, 13],
+    [12, 13, 14, 14],
+    [13, 13, 15, 15],
+];
+/// The cliff of the plateau, which only tall units walk over.
+const PLATEAU_CLIFF: [usize; 4] = [4, 27, 12, 13];
+/// The higher ground; the ramps lead up to it.
+const PLATEAU_TOP: [usize; 4] = [4, 27, 14, 19];
 /// Cells of a path that are looked along.
 const LOOK_ALONG_PATH: usize = 8;
 
@@ -183,6 +288,15 @@ const NEIGHBOURS_FACES_FIRST: [(i32, i32); 9] = [
     (-1, 1),
     (-1, -1),
 ];
+
+/// Changes the cells of a rectangle: inclusive x range, inclusive y range.
+fn fill<T>(cells: &mut [T], [x_first, x_last, y_first, y_last]: [usize; 4], change: fn(&mut T)) {
+    for y in y_first..=y_last {
+        cells[y * MAP_SIZE + x_first..=y * MAP_SIZE + x_last]
+            .iter_mut()
+            .for_each(change);
+    }
+}
 
 /// Moves a disc out of the cell with corner (`cell_x`, `cell_y`), by the shortest way.
 fn pushed_out_of_cell(x: f32, y: f32, radius: f32, cell_x: i32, cell_y: i32) -> (f32, f32) {
@@ -265,18 +379,42 @@ mod tests {
     #[test]
     fn a_way_leads_round_a_corner() {
         let bend = Terrain::from_rectangles(&[[2, 5, 2, 20], [2, 20, 2, 5]]);
-        let (mut at, to) = ([3.5, 19.0], [19.0, 3.5]);
-        for _ in 0..80 {
-            let [x, y] = bend.waypoint(at, to, 0.375);
+        walk(&bend, [3.5, 19.0], [19.0, 3.5], 40.0);
+    }
+
+    #[test]
+    fn a_way_leads_through_the_choke_of_the_corridor() {
+        let corridor = Terrain::named(TerrainName::Corridor);
+        walk(&corridor, [27.0, 28.0], [4.47, 4.33], 36.0);
+        walk(&corridor, [4.47, 4.33], [14.5, 20.0], 24.0);
+    }
+
+    #[test]
+    fn a_way_leads_round_the_cliff_and_for_the_tall_over_it() {
+        let plateau = Terrain::named(TerrainName::Plateau);
+        walk(&plateau, [12.0, 9.0], [12.0, 16.0], 26.0);
+        walk(&plateau, [20.0, 9.0], [20.0, 16.0], 26.0);
+        let over = plateau.for_layer(Layer::Tall).unwrap();
+        walk(over, [16.0, 9.0], [16.0, 16.0], 7.5);
+        assert!(!over.is_walkable(16, 12), "agents are told of the cliff");
+        assert_eq!(plateau.for_layer(Layer::Air), None);
+    }
+
+    /// Follows waypoints until the destination; fails if the way is longer than `longest`.
+    fn walk(terrain: &Terrain, from: [f32; 2], to: [f32; 2], longest: f32) {
+        let (mut at, mut length) = (from, 0.0);
+        while (at[0] - to[0]).hypot(at[1] - to[1]) > 0.01 {
+            let [x, y] = terrain.waypoint(at, to, 0.375);
             let (dx, dy) = (x - at[0], y - at[1]);
-            let part = (0.5 / (dx * dx + dy * dy).sqrt()).min(1.0);
-            let (x, y) = bend.pushed_out_of_walls(at[0] + dx * part, at[1] + dy * part, 0.375);
+            let part = (0.14 / dx.hypot(dy)).min(1.0);
+            let (x, y) = terrain.pushed_out_of_walls(at[0] + dx * part, at[1] + dy * part, 0.375);
             at = [x, y];
+            length += 0.14;
+            assert!(
+                length < longest,
+                "after {length} at {at:?}, from {from:?} to {to:?}"
+            );
         }
-        assert!(
-            (at[0] - to[0]).abs() + (at[1] - to[1]).abs() < 0.1,
-            "got to {at:?}"
-        );
     }
 
     #[test]

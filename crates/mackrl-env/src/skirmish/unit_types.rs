@@ -19,6 +19,8 @@ pub enum UnitData {
     /// Base Wings of Liberty, on which SMAC's maps depend.
     #[default]
     Liberty,
+    /// Legacy of the Void 4.10, which other simulators of these maps follow.
+    Lotv,
 }
 
 /// All unit types and the constants that they share.
@@ -39,6 +41,9 @@ pub struct UnitTypes {
     pub help_radius: f32,
     /// Seconds between two calls for help of one unit.
     pub help_period_s: f32,
+    /// How much farther than its weapon reaches a unit notices targets by itself, if that is more than `scan_range`.
+    #[serde(default)]
+    pub scan_margin: f32,
     /// Distance from where a chase began at which it is given up.
     pub leash: f32,
     /// The types.
@@ -74,8 +79,17 @@ pub struct UnitType {
     pub inner_radius: f32,
     /// Sight in map units; unused while the maps lift the fog for everybody.
     pub sight: f32,
+    /// Where it moves: what it collides with, and which weapons reach it.
+    #[serde(default)]
+    pub layer: Layer,
+    /// Map units per second by which its speed grows in a second; absent if it is at full speed at once.
+    pub acceleration: Option<f32>,
     /// What bonus damage and healing ask for.
     pub attributes: Vec<Attribute>,
+    /// Energy, if it has any.
+    pub energy: Option<Energy>,
+    /// How it heals friends, if it does.
+    pub heal: Option<Heal>,
     /// The weapon, if it has one.
     pub weapon: Option<Weapon>,
 }
@@ -96,6 +110,49 @@ pub enum Attribute {
     Massive,
     /// A building.
     Structure,
+}
+
+/// Where a unit moves.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Layer {
+    /// On the ground, kept off by walls.
+    #[default]
+    Ground,
+    /// So tall that it walks over troops and cliffs, and that weapons against air reach it too.
+    Tall,
+    /// In the air.
+    Air,
+}
+
+/// Energy of a unit that casts.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Energy {
+    /// At the start of an episode, ≤ `maximum`.
+    pub initial: f32,
+    /// Full energy, > 0.
+    pub maximum: f32,
+    /// What comes back in a second.
+    pub regeneration_per_s: f32,
+}
+
+/// How a unit heals its friends, one at a time and without a pause.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Heal {
+    /// Greatest distance from edge to edge.
+    pub range: f32,
+    /// Distance from edge to edge within which it looks for patients by itself.
+    pub autocast_range: f32,
+    /// Least energy with which it begins by itself.
+    pub autocast_energy: f32,
+    /// Life that it gives in a second.
+    pub life_per_s: f32,
+    /// Energy that a point of life costs, > 0.
+    pub energy_per_life: f32,
+    /// Which patients it can heal.
+    pub patients: Attribute,
 }
 
 /// What a weapon can hit.
@@ -171,6 +228,22 @@ pub enum Delivery {
         /// Damage to structures, instead of the weapon's own.
         structure_damage: f32,
     },
+    /// By beams that sweep across the target, at right angles to the line of fire. Each of the weapon's hits is a beam: the
+    /// first sweeps from left to right, the next back, and so on. A beam hits everybody at most once.
+    Sweep {
+        /// Map units from the target to either end.
+        half_width: f32,
+        /// Map units between two points of the sweep, > 0.
+        spacing: f32,
+        /// Distance from a point to a victim's edge within which the beam touches it.
+        radius: f32,
+        /// Seconds between two points.
+        interval_s: f32,
+        /// Seconds from the touch to the hit.
+        delay_s: f32,
+        /// Seconds from the start of the sweep to the hit on the target itself.
+        target_delay_s: f32,
+    },
 }
 
 impl UnitTypes {
@@ -179,14 +252,16 @@ impl UnitTypes {
     /// # Errors
     /// [`SkirmishError::UnitFile`] if the embedded file is damaged.
     pub fn load(data: UnitData) -> Result<Arc<Self>, SkirmishError> {
-        static LIBERTY: OnceLock<Result<Arc<UnitTypes>, SkirmishError>> = OnceLock::new();
-        match data {
-            UnitData::Liberty => LIBERTY
-                .get_or_init(|| {
-                    Self::parse(include_str!("../../../../units/liberty.toml")).map(Arc::new)
-                })
-                .clone(),
-        }
+        type Parsed = OnceLock<Result<Arc<UnitTypes>, SkirmishError>>;
+        static LIBERTY: Parsed = OnceLock::new();
+        static LOTV: Parsed = OnceLock::new();
+        let (parsed, text) = match data {
+            UnitData::Liberty => (&LIBERTY, include_str!("../../../../units/liberty.toml")),
+            UnitData::Lotv => (&LOTV, include_str!("../../../../units/lotv.toml")),
+        };
+        parsed
+            .get_or_init(|| Self::parse(text).map(Arc::new))
+            .clone()
     }
 
     /// Reads the contents of a file of `units/`.
@@ -218,6 +293,7 @@ impl UnitTypes {
             self.shield_delay_s,
             self.minimum_damage,
             self.scan_range,
+            self.scan_margin,
             self.help_radius,
             self.help_period_s,
             self.leash,
@@ -228,6 +304,24 @@ impl UnitTypes {
             "all",
         )?;
         self.types.iter().try_for_each(|unit| unit.validate(least))
+    }
+}
+
+impl Layer {
+    /// Whether weapons against `plane` reach units of this layer.
+    #[must_use]
+    pub fn is_in(self, plane: Plane) -> bool {
+        match self {
+            Self::Ground => plane == Plane::Ground,
+            Self::Tall => true,
+            Self::Air => plane == Plane::Air,
+        }
+    }
+
+    /// Whether units of two layers are in each other's way; the tall walk over those on the ground.
+    #[must_use]
+    pub fn collides_with(self, other: Self) -> bool {
+        (self == Self::Ground) == (other == Self::Ground)
     }
 }
 
@@ -266,6 +360,7 @@ impl UnitType {
             "statistics are ≥ 0",
             &self.name,
         )?;
+        self.validate_casting()?;
         let Some(weapon) = &self.weapon else {
             return Ok(());
         };
@@ -307,7 +402,58 @@ impl UnitType {
                 "a missile's speed is ≥ 1",
                 &self.name,
             ),
+            Delivery::Sweep {
+                half_width,
+                spacing,
+                radius,
+                interval_s,
+                delay_s,
+                target_delay_s,
+            } => require(
+                (0.0..=16.0).contains(&half_width)
+                    && spacing >= 0.05
+                    && [radius, interval_s, delay_s, target_delay_s]
+                        .iter()
+                        .all(|x| (0.0..=16.0).contains(x)),
+                "a sweep's spacing is ≥ 0.05 and its other numbers are in [0, 16]",
+                &self.name,
+            ),
         }
+    }
+
+    fn validate_casting(&self) -> Result<(), SkirmishError> {
+        require(
+            self.acceleration
+                .is_none_or(|rate| rate > 0.0 && is_magnitude(rate)),
+            "acceleration is > 0",
+            &self.name,
+        )?;
+        require(
+            self.energy.is_none_or(|energy| {
+                energy.maximum > 0.0
+                    && is_magnitude(energy.maximum)
+                    && (0.0..=energy.maximum).contains(&energy.initial)
+                    && is_magnitude(energy.regeneration_per_s)
+            }),
+            "energy is initial ≤ maximum, maximum > 0, regeneration ≥ 0",
+            &self.name,
+        )?;
+        let Some(heal) = self.heal else { return Ok(()) };
+        let numbers = [
+            heal.range,
+            heal.autocast_range,
+            heal.autocast_energy,
+            heal.life_per_s,
+        ];
+        require(
+            numbers.iter().all(|x| is_magnitude(*x))
+                && heal.energy_per_life > 0.0
+                && is_magnitude(heal.energy_per_life)
+                && self.energy.is_some()
+                && self.weapon.is_none(),
+            "healers have energy and no weapon, energy_per_life is > 0 and other numbers are ≥ 0",
+            &self.name,
+        )
     }
 }
 

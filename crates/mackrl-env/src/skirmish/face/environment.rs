@@ -39,6 +39,26 @@ pub struct Skirmish {
     key: EpisodeKey,
     steps: usize,
     statistics: EpisodeStatistics,
+    tally: BattleTally,
+}
+
+/// Episodes that have ended since the environment was made.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct BattleTally {
+    /// All of them.
+    pub battles_game: u64,
+    /// Those that the agents won.
+    pub battles_won: u64,
+    /// Those that ran out of time, which SMAC also counts as draws.
+    pub timeouts: u64,
+}
+
+impl BattleTally {
+    /// Battles won of battles ended; 0 before the first.
+    #[must_use]
+    pub fn win_rate(&self) -> f64 {
+        self.battles_won as f64 / self.battles_game.max(1) as f64
+    }
 }
 
 impl Skirmish {
@@ -57,11 +77,10 @@ impl Skirmish {
             };
             battle.add(recruit.kind, recruit.team, stance, recruit.at);
         }
-        let terrain = scenario.field.terrain.clone();
         let profiles = &scenario.field.profiles;
         Ok(Self {
             spec: layout.spec(&scenario, &settings),
-            knowledge: Arc::new(SkirmishKnowledge::new(terrain, scenario.agents, &settings)),
+            knowledge: Arc::new(SkirmishKnowledge::new(&scenario, &settings)),
             cooldown_scales: profiles
                 .iter()
                 .map(|profile| cooldown_scale(&profile.name))
@@ -72,6 +91,7 @@ impl Skirmish {
             key: EpisodeKey::new(0, crate::Stream::Other, 0),
             steps: 0,
             statistics: EpisodeStatistics::default(),
+            tally: BattleTally::default(),
             layout,
             battle,
             settings,
@@ -91,6 +111,12 @@ impl Skirmish {
         &self.scenario
     }
 
+    /// Episodes ended and won since the environment was made.
+    #[must_use]
+    pub fn tally(&self) -> BattleTally {
+        self.tally
+    }
+
     /// A number that differs, but for chance, when two states of the battle differ; the same on every machine.
     #[must_use]
     pub fn state_hash(&self) -> u64 {
@@ -100,7 +126,11 @@ impl Skirmish {
     fn write(&self, out: &mut ObservationMut<'_>) {
         let scene = self.scene();
         scene.write(out);
-        scene.write_state(&self.cooldown_scales, out.state_g);
+        if self.layout.obs_instead_of_state {
+            out.state_g.copy_from_slice(out.observation_no);
+        } else {
+            scene.write_state(&self.cooldown_scales, out.state_g);
+        }
     }
 
     fn scene(&self) -> Scene<'_> {
@@ -110,6 +140,7 @@ impl Skirmish {
             battle: &self.battle,
             last_actions: &self.last_actions,
             sight_range: self.settings.sight_range,
+            time: self.steps as f32 / self.spec.episode_limit as f32,
         }
     }
 
@@ -154,9 +185,18 @@ impl Skirmish {
                 3 => Order::Move { to: [x, y - far] },
                 4 => Order::Move { to: [x + far, y] },
                 5 => Order::Move { to: [x - far, y] },
-                target => Order::Attack {
-                    target: unit_index(self.layout.agents + target - TARGET_ACTIONS_FROM),
-                },
+                target => {
+                    let target = self
+                        .knowledge
+                        .target(agent, target - TARGET_ACTIONS_FROM)
+                        .expect("actions are checked to be available");
+                    let target = unit_index(target);
+                    if self.knowledge.is_healer(agent) {
+                        Order::Heal { target }
+                    } else {
+                        Order::Attack { target }
+                    }
+                }
             };
             self.battle.order(unit_index(agent), order);
         }
@@ -164,12 +204,34 @@ impl Skirmish {
 
     fn outcome(&self) -> Outcome {
         let state = self.battle.state();
-        match (state.living(Team::Ally), state.living(Team::Enemy)) {
+        let (allies, enemies) = (state.living(Team::Ally), state.living(Team::Enemy));
+        // Where the team has healers, SMAC ends the battle when only healers are left: the team's own first, even if all
+        // are dead, then a single one of the enemy's.
+        let has_healers = (0..self.layout.agents).any(|agent| self.knowledge.is_healer(agent));
+        if has_healers && self.fighters(Team::Ally) == 0 {
+            return Outcome::Lost;
+        }
+        match (allies, enemies) {
             (0, 0) => Outcome::BothDead,
             (0, _) => Outcome::Lost,
             (_, 0) => Outcome::Won,
+            (_, 1) if has_healers && self.fighters(Team::Enemy) == 0 => Outcome::Won,
             _ => Outcome::Undecided,
         }
+    }
+
+    /// Living units of `team` that do not heal.
+    fn fighters(&self, team: Team) -> usize {
+        let (state, field) = (self.battle.state(), self.battle.field());
+        state
+            .units
+            .iter()
+            .filter(|unit| {
+                unit.team == team
+                    && unit.is_alive()
+                    && field.profiles[usize::from(unit.kind)].care.is_none()
+            })
+            .count()
     }
 
     fn end(&self, outcome: Outcome) -> Option<EpisodeEnd> {
@@ -238,10 +300,11 @@ impl Environment for Skirmish {
             dead_enemies: self.layout.enemies - state.living(Team::Enemy),
         };
         self.write(out);
-        Ok(TimeStep {
-            reward,
-            end: self.end(outcome),
-        })
+        let end = self.end(outcome);
+        self.tally.battles_game += u64::from(end.is_some());
+        self.tally.battles_won += u64::from(outcome == Outcome::Won);
+        self.tally.timeouts += u64::from(end == Some(EpisodeEnd::Truncated));
+        Ok(TimeStep { reward, end })
     }
 
     fn statistics(&self) -> EpisodeStatistics {

@@ -4,7 +4,10 @@ use std::sync::Arc;
 
 use crate::{
     Action, AgentId, EntityId, KnownEntities, PriorKnowledge,
-    skirmish::{face::layout::TARGET_ACTIONS_FROM, settings::SkirmishSettings, terrain::Terrain},
+    skirmish::{
+        face::layout::TARGET_ACTIONS_FROM, scenario::Scenario, settings::SkirmishSettings,
+        terrain::Terrain,
+    },
 };
 
 /// The field of view and the rules of availability, as functions of positions alone.
@@ -15,6 +18,8 @@ use crate::{
 pub struct SkirmishKnowledge {
     terrain: Arc<Terrain>,
     agents: usize,
+    /// Per agent: whether its targets are friends to heal instead of enemies.
+    heals: Vec<bool>,
     sight_squared: f32,
     shoot_squared: f32,
     /// How far ahead a move looks: half of what it goes.
@@ -22,10 +27,16 @@ pub struct SkirmishKnowledge {
 }
 
 impl SkirmishKnowledge {
-    pub(super) fn new(terrain: Arc<Terrain>, agents: usize, settings: &SkirmishSettings) -> Self {
+    pub(super) fn new(scenario: &Scenario, settings: &SkirmishSettings) -> Self {
+        let profiles = &scenario.field.profiles;
+        let agents = &scenario.recruits[..scenario.agents];
         Self {
-            terrain,
-            agents,
+            terrain: scenario.field.terrain.clone(),
+            agents: scenario.agents,
+            heals: agents
+                .iter()
+                .map(|agent| profiles[usize::from(agent.kind)].care.is_some())
+                .collect(),
             sight_squared: settings.sight_range * settings.sight_range,
             shoot_squared: settings.shoot_range * settings.shoot_range,
             move_ahead: f64::from(settings.move_amount) / 2.0,
@@ -42,6 +53,63 @@ impl SkirmishKnowledge {
     #[must_use]
     pub fn is_in_shooting_range(&self, dx: f32, dy: f32) -> bool {
         dx * dx + dy * dy <= self.shoot_squared
+    }
+
+    /// Whether the targets of `agent` are friends to heal.
+    #[must_use]
+    pub fn is_healer(&self, agent: usize) -> bool {
+        self.heals[agent]
+    }
+
+    /// The unit that action number [`TARGET_ACTIONS_FROM`] + `target` of `agent` is about, if that can be aimed at: an enemy,
+    /// or for a healer a friend that is none. Healers aim at agents by the numbers that others have for enemies, so that
+    /// they cannot aim at more friends than there are enemies.
+    #[must_use]
+    pub fn target(&self, agent: usize, target: usize) -> Option<usize> {
+        if self.heals[agent] {
+            (target < self.agents && !self.heals[target]).then_some(target)
+        } else {
+            Some(self.agents + target)
+        }
+    }
+
+    /// The walkable cells around (`x`, `y`) that agents may be told of: eight points at twice the move north, south, east and
+    /// west and at one move along the diagonals; 1 if walkable or outside the map, else 0.
+    pub(super) fn pathing(&self, x: f32, y: f32) -> [f32; 8] {
+        self.surroundings(x, y).map(|(x, y)| {
+            let is_outside = !Terrain::is_inside(x, y);
+            f32::from(u8::from(is_outside || self.terrain.is_walkable(x, y)))
+        })
+    }
+
+    /// Heights at the points of [`Self::pathing`] and at the unit's own cell.
+    pub(super) fn heights(&self, x: f32, y: f32) -> [f32; 9] {
+        let around = self.surroundings(x, y);
+        std::array::from_fn(|point| {
+            let (x, y) = around
+                .get(point)
+                .copied()
+                .unwrap_or((truncated(x.into()), truncated(y.into())));
+            self.terrain.height(x, y)
+        })
+    }
+
+    /// Cells of SMAC's surrounding points, from the truncated position.
+    fn surroundings(&self, x: f32, y: f32) -> [(i32, i32); 8] {
+        let (x, y) = (f64::from(x).trunc(), f64::from(y).trunc());
+        let near = 2.0 * self.move_ahead;
+        let far = 2.0 * near;
+        [
+            (0.0, far),
+            (0.0, -far),
+            (far, 0.0),
+            (-far, 0.0),
+            (near, near),
+            (-near, -near),
+            (near, -near),
+            (-near, near),
+        ]
+        .map(|(dx, dy)| (truncated((x + dx).floor()), truncated((y + dy).floor())))
     }
 
     /// Whether moves north, south, east and west are available at (`x`, `y`): SMAC looks at the cell half a move ahead,
@@ -77,9 +145,10 @@ impl PriorKnowledge for SkirmishKnowledge {
         let Some(own) = known.get(agent) else { return };
         available_a[1] = true;
         available_a[2..TARGET_ACTIONS_FROM].copy_from_slice(&self.moves(own[0], own[1]));
-        for (enemy, available) in available_a[TARGET_ACTIONS_FROM..].iter_mut().enumerate() {
-            *available = known
-                .get(EntityId::new(self.agents + enemy))
+        for (target, available) in available_a[TARGET_ACTIONS_FROM..].iter_mut().enumerate() {
+            *available = self
+                .target(agent.index(), target)
+                .and_then(|target| known.get(EntityId::new(target)))
                 .is_some_and(|f| self.is_in_shooting_range(f[0] - own[0], f[1] - own[1]));
         }
     }

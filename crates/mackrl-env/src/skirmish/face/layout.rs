@@ -30,6 +30,20 @@ pub(super) struct Layout {
     pub(super) enemy_type: Vec<Option<usize>>,
     /// Whether agents see the last actions of allies.
     pub(super) obs_last_action: bool,
+    /// Whether agents see their own life and shield.
+    pub(super) obs_own_health: bool,
+    /// Whether agents see the life and shields of others.
+    pub(super) obs_all_health: bool,
+    /// Whether agents see where one can walk around them.
+    pub(super) obs_pathing_grid: bool,
+    /// Whether agents see how high the ground around them is.
+    pub(super) obs_terrain_height: bool,
+    /// Whether agents see the time.
+    pub(super) obs_timestep_number: bool,
+    /// Whether the state is all agents' observations.
+    pub(super) obs_instead_of_state: bool,
+    /// Whether the state ends with the time.
+    pub(super) state_timestep_number: bool,
     /// Whether the state ends with last actions.
     pub(super) state_last_action: bool,
     /// Whether entity features have a shield.
@@ -72,6 +86,13 @@ impl Layout {
             enemy_type: (0..kinds).map(|kind| place(&enemy_order, kind)).collect(),
             obs_last_action: settings.obs_last_action,
             state_last_action: settings.state_last_action,
+            obs_own_health: settings.obs_own_health,
+            obs_all_health: settings.obs_all_health,
+            obs_pathing_grid: settings.obs_pathing_grid,
+            obs_terrain_height: settings.obs_terrain_height,
+            obs_timestep_number: settings.obs_timestep_number,
+            obs_instead_of_state: settings.obs_instead_of_state,
+            state_timestep_number: settings.state_timestep_number,
             entity_shields: scenario
                 .field
                 .profiles
@@ -81,29 +102,44 @@ impl Layout {
         }
     }
 
-    /// \[attackable, distance, x, y, life, (shield), (type)\].
+    /// \[attackable, distance, x, y, (life, (shield)), (type)\].
     pub(super) fn enemy_row(&self) -> usize {
-        5 + self.enemy_shields + self.type_bits
+        4 + self.health(self.enemy_shields) + self.type_bits
     }
 
-    /// \[visible, distance, x, y, life, (shield), (type), (last action)\].
+    /// Entries for the life and shield of somebody else.
+    fn health(&self, shields: usize) -> usize {
+        if self.obs_all_health { 1 + shields } else { 0 }
+    }
+
+    /// \[visible, distance, x, y, (life, (shield)), (type), (last action)\].
     pub(super) fn ally_row(&self) -> usize {
         let last_action = if self.obs_last_action {
             self.actions
         } else {
             0
         };
-        5 + self.ally_shields + self.type_bits + last_action
+        4 + self.health(self.ally_shields) + self.type_bits + last_action
     }
 
-    /// \[life, (shield), (type)\].
+    /// \[(life, (shield)), (type)\].
     pub(super) fn own_row(&self) -> usize {
-        1 + self.ally_shields + self.type_bits
+        let health = if self.obs_own_health {
+            1 + self.ally_shields
+        } else {
+            0
+        };
+        health + self.type_bits
     }
 
     pub(super) fn observation_size(&self) -> usize {
         let moves = 4;
+        let pathing = if self.obs_pathing_grid { 8 } else { 0 };
+        let heights = if self.obs_terrain_height { 9 } else { 0 };
         moves
+            + pathing
+            + heights
+            + usize::from(self.obs_timestep_number)
             + self.enemies * self.enemy_row()
             + (self.agents - 1) * self.ally_row()
             + self.own_row()
@@ -120,12 +156,18 @@ impl Layout {
     }
 
     pub(super) fn state_size(&self) -> usize {
+        if self.obs_instead_of_state {
+            return self.agents * self.observation_size();
+        }
         let last_actions = if self.state_last_action {
             self.agents * self.actions
         } else {
             0
         };
-        self.agents * self.state_ally_row() + self.enemies * self.state_enemy_row() + last_actions
+        self.agents * self.state_ally_row()
+            + self.enemies * self.state_enemy_row()
+            + last_actions
+            + usize::from(self.state_timestep_number)
     }
 
     /// F: \[x, y, life, (shield), (kind)\].

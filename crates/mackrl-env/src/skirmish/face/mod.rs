@@ -7,7 +7,7 @@ mod observation;
 mod reward;
 mod state_vector;
 
-pub use environment::Skirmish;
+pub use environment::{BattleTally, Skirmish};
 pub use knowledge::SkirmishKnowledge;
 
 #[cfg(test)]

@@ -19,6 +19,8 @@ pub(super) struct Scene<'a> {
     pub(super) battle: &'a Battle,
     pub(super) last_actions: &'a [Option<Action>],
     pub(super) sight_range: f32,
+    /// Part of the episode's limit that has passed, in \[0, 1\].
+    pub(super) time: f32,
 }
 
 /// Fills a buffer from the front.
@@ -73,14 +75,23 @@ impl Scene<'_> {
             1 => true,
             2..TARGET_ACTIONS_FROM => self.knowledge.moves(x, y)[action - 2],
             _ => {
-                let target = self.layout.agents + action - TARGET_ACTIONS_FROM;
-                target < state.units.len()
-                    && state.units[target].is_alive()
-                    && self
-                        .knowledge
-                        .is_in_shooting_range(state.x[target] - x, state.y[target] - y)
+                let target = action - TARGET_ACTIONS_FROM;
+                target < self.layout.enemies && self.can_aim(agent, target)
             }
         }
+    }
+
+    /// Whether `agent` can choose its target number `target`, which lives and is in range.
+    fn can_aim(&self, agent: usize, target: usize) -> bool {
+        let state = self.battle.state();
+        let Some(target) = self.knowledge.target(agent, target) else {
+            return false;
+        };
+        state.units[target].is_alive()
+            && self.knowledge.is_in_shooting_range(
+                state.x[target] - state.x[agent],
+                state.y[target] - state.y[agent],
+            )
     }
 
     /// Entity features \[M, F\]: position, life, shield, kind; zeros for the dead.
@@ -120,6 +131,15 @@ impl Scene<'_> {
         let state = self.battle.state();
         let own = &state.units[agent];
         available_a.fill(false);
+        let observation_o = if self.layout.obs_timestep_number {
+            let (last, rest) = observation_o
+                .split_last_mut()
+                .expect("the layout leaves room for the time");
+            *last = self.time;
+            rest
+        } else {
+            observation_o
+        };
         if !own.is_alive() {
             observation_o.fill(0.0);
             available_a[0] = true;
@@ -133,18 +153,24 @@ impl Scene<'_> {
         for is_possible in moves {
             row.put(if is_possible { 1.0 } else { 0.0 });
         }
+        self.write_ground(agent, &mut row);
+        let heals = self.knowledge.is_healer(agent);
         for enemy in 0..self.layout.enemies {
             let index = self.layout.agents + enemy;
-            let can_shoot = self.write_enemy(agent, index, &mut row, &mut seen);
-            available_a[TARGET_ACTIONS_FROM + enemy] = can_shoot;
+            // SMAC shows a healer, beside each enemy, whether the action of that number is available.
+            let can_heal = heals.then(|| self.can_aim(agent, enemy));
+            let can_shoot = self.write_enemy((agent, index), can_heal, &mut row, &mut seen);
+            available_a[TARGET_ACTIONS_FROM + enemy] = can_heal.unwrap_or(can_shoot);
         }
         for ally in (0..self.layout.agents).filter(|ally| *ally != agent) {
             self.write_ally(agent, ally, &mut row, &mut seen);
         }
         let profile = self.profile(own);
-        row.put(own.life / profile.life);
-        if self.layout.ally_shields > 0 {
-            row.put(shield_fraction(own, profile));
+        if self.layout.obs_own_health {
+            row.put(own.life / profile.life);
+            if self.layout.ally_shields > 0 {
+                row.put(shield_fraction(own, profile));
+            }
         }
         row.put_one_hot(
             self.layout.ally_type[usize::from(own.kind)],
@@ -153,11 +179,27 @@ impl Scene<'_> {
         EntitySet::from_bits(seen)
     }
 
-    /// A row about an enemy; returns whether it can be chosen as a target.
+    /// Walkability and heights around an agent, if shown.
+    fn write_ground(&self, agent: usize, row: &mut Cursor<'_>) {
+        let state = self.battle.state();
+        let (x, y) = (state.x[agent], state.y[agent]);
+        if self.layout.obs_pathing_grid {
+            for value in self.knowledge.pathing(x, y) {
+                row.put(value);
+            }
+        }
+        if self.layout.obs_terrain_height {
+            for value in self.knowledge.heights(x, y) {
+                row.put(value);
+            }
+        }
+    }
+
+    /// A row about an enemy, which begins with `flag` or else with whether it can be shot at; returns whether it can.
     fn write_enemy(
         &self,
-        agent: usize,
-        index: usize,
+        (agent, index): (usize, usize),
+        flag: Option<bool>,
         row: &mut Cursor<'_>,
         seen: &mut u128,
     ) -> bool {
@@ -167,7 +209,7 @@ impl Scene<'_> {
         };
         *seen |= 1 << index;
         let can_shoot = self.knowledge.is_in_shooting_range(dx, dy);
-        row.put(if can_shoot { 1.0 } else { 0.0 });
+        row.put(f32::from(u8::from(flag.unwrap_or(can_shoot))));
         self.write_unit(index, dx, dy, self.layout.enemy_shields, row);
         let kind = usize::from(self.battle.state().units[index].kind);
         row.put_one_hot(self.layout.enemy_type[kind], self.layout.type_bits);
@@ -190,13 +232,16 @@ impl Scene<'_> {
         }
     }
 
-    /// \[distance, x, y\] over the sight range, life, shield if shown.
+    /// \[distance, x, y\] over the sight range; life and shield if shown.
     fn write_unit(&self, index: usize, dx: f32, dy: f32, shields: usize, row: &mut Cursor<'_>) {
         let unit = &self.battle.state().units[index];
         let profile = self.profile(unit);
         row.put((dx * dx + dy * dy).sqrt() / self.sight_range);
         row.put(dx / self.sight_range);
         row.put(dy / self.sight_range);
+        if !self.layout.obs_all_health {
+            return;
+        }
         row.put(unit.life / profile.life);
         if shields > 0 {
             row.put(shield_fraction(unit, profile));

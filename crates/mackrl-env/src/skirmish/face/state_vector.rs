@@ -48,6 +48,9 @@ impl Scene<'_> {
                 row.put_one_hot(last_action.map(Action::index), layout.actions);
             }
         }
+        if layout.state_timestep_number {
+            row.put(self.time);
+        }
     }
 
     fn write_state_ally(&self, agent: usize, cooldown_scales: &[f32], row: &mut Cursor<'_>) {
@@ -59,7 +62,12 @@ impl Scene<'_> {
         let profile = self.profile(unit);
         let kind = usize::from(unit.kind);
         row.put(unit.life / profile.life);
-        row.put(unit.cooldown.max(0.0) / cooldown_scales[kind]);
+        // A healer, which has no weapon, shows its energy in the place of a cooldown.
+        row.put(if profile.care.is_some() {
+            unit.energy / profile.greatest_energy
+        } else {
+            unit.cooldown.max(0.0) / cooldown_scales[kind]
+        });
         self.write_place(agent, row);
         if self.layout.ally_shields > 0 {
             row.put(shield_fraction(unit, profile));

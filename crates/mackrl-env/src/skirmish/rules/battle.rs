@@ -26,6 +26,8 @@ pub(super) struct Scratch {
     pub(super) footing: Vec<Footing>,
     /// Hits that land at the end of this loop.
     pub(super) hits: Vec<Hit>,
+    /// Healers and their patients in this loop.
+    pub(super) treatments: Vec<(usize, usize)>,
     /// Units that explode at the end of this loop.
     pub(super) exploding: Vec<usize>,
     /// Where units are about to be.
@@ -84,6 +86,8 @@ impl Battle {
             stance,
             life: profile.life,
             shield: profile.shield,
+            energy: profile.energy,
+            pace: 0.0,
             order: Order::Stop,
             quarry: None,
             chase_from: [x, y],
@@ -101,8 +105,17 @@ impl Battle {
     }
 
     /// Gives a living unit an order. An order that it already has changes nothing; another one ends an attack that has not
-    /// reached its damage point.
+    /// reached its damage point. One that it cannot obey (to attack what its weapon does not reach, to heal the whole or the
+    /// mechanical) is refused, and it goes on with what it was doing.
     pub fn order(&mut self, unit: UnitIndex, order: Order) {
+        let is_refused = match order {
+            Order::Attack { target } => !self.can_attack(usize::from(unit), usize::from(target)),
+            Order::Heal { target } => !self.can_heal(usize::from(unit), usize::from(target)),
+            _ => false,
+        };
+        if is_refused {
+            return;
+        }
         let unit = &mut self.state.units[usize::from(unit)];
         if unit.is_alive() && unit.order != order {
             unit.order = order;
@@ -121,6 +134,7 @@ impl Battle {
         self.fly_missiles();
         self.count_down_blows();
         self.land_hits();
+        self.treat();
         self.regenerate();
     }
 
@@ -130,6 +144,7 @@ impl Battle {
         self.state.blows.reserve(4 * units);
         self.scratch.hits.reserve(4 * units);
         self.scratch.exploding.reserve(units);
+        self.scratch.treatments.reserve(units);
         self.scratch.destination.resize(units, None);
         self.scratch.footing.resize(units, Footing::Standing);
         self.scratch.steps.resize(units);

@@ -6,7 +6,7 @@
 //! stands for the backswing.
 
 use crate::skirmish::rules::{
-    Battle, Battlefield, Blow, Chance, Missile, Order, Stance, Strike, UnitIndex,
+    Battle, Battlefield, Blow, Chance, Missile, Order, Stance, Strike, Sweep, UnitIndex,
     movement::Footing, profile::Effect,
 };
 
@@ -34,6 +34,10 @@ impl Battle {
                 Footing::Standing
             };
             self.tick(index);
+            if let Some(care) = &field.profiles[kind].care {
+                self.tend(&field, index, care);
+                continue;
+            }
             match self.target_of(index) {
                 Some(target) => self.fight(&field, index, usize::from(target), chance),
                 None => self.follow_order(index),
@@ -79,7 +83,7 @@ impl Battle {
                 .is_some_and(|strike| strike.effects[usize::from(other.kind)].can_hit)
     }
 
-    fn follow_order(&mut self, index: usize) {
+    pub(super) fn follow_order(&mut self, index: usize) {
         let unit = &mut self.state.units[index];
         unit.swing = None;
         let waits = unit.stance == Stance::Aggressive && unit.backswing > 0.0;
@@ -96,7 +100,7 @@ impl Battle {
         }
     }
 
-    fn set_out(&mut self, index: usize, to: [f32; 2]) {
+    pub(super) fn set_out(&mut self, index: usize, to: [f32; 2]) {
         self.scratch.destination[index] = Some(to);
         self.scratch.footing[index] = Footing::Walking;
     }
@@ -156,6 +160,10 @@ impl Battle {
             self.scratch.exploding.push(index);
             return;
         }
+        if let Some(sweep) = &strike.sweep {
+            self.sweep_beams(index, target, strike, sweep);
+            return;
+        }
         let (attacker, victim) = (small(index), small(target));
         if strike.missile_speed.is_some() {
             self.state.missiles.push(Missile {
@@ -176,6 +184,47 @@ impl Battle {
                 target: victim,
                 striker: attacker,
             });
+        }
+    }
+
+    /// Enters the hits of beams that sweep across `target`, on everybody who stands in their way now.
+    fn sweep_beams(&mut self, index: usize, target: usize, strike: &Strike, sweep: &Sweep) {
+        let (x, y) = (self.state.x[target], self.state.y[target]);
+        let (dx, dy) = (x - self.state.x[index], y - self.state.y[index]);
+        let scale = 1.0 / (dx * dx + dy * dy).sqrt().max(1e-6);
+        let across = [-dy * scale, dx * scale];
+        let team = self.state.units[index].team;
+        for victim in 0..self.state.units.len() {
+            let other = &self.state.units[victim];
+            let kind = usize::from(other.kind);
+            if other.team == team || !other.is_alive() || !strike.effects[kind].can_hit {
+                continue;
+            }
+            let reach = sweep.radius + self.field.profiles[kind].radius;
+            let is_touched = |point: &f32| {
+                let gap_x = self.state.x[victim] - x - across[0] * point;
+                let gap_y = self.state.y[victim] - y - across[1] * point;
+                gap_x * gap_x + gap_y * gap_y <= reach * reach
+            };
+            let touches = [
+                sweep.points.iter().position(is_touched),
+                sweep.points.iter().rev().position(is_touched),
+            ];
+            for beam in 0..strike.hits {
+                let delay = if victim == target {
+                    Some(sweep.target_delay)
+                } else {
+                    touches[usize::from(beam % 2)]
+                        .map(|point| point as f32 * sweep.interval + sweep.delay)
+                };
+                if let Some(delay) = delay {
+                    self.state.blows.push(Blow {
+                        delay,
+                        target: small(victim),
+                        striker: small(index),
+                    });
+                }
+            }
         }
     }
 
@@ -302,6 +351,9 @@ impl Battle {
                 unit.shield = (unit.shield + field.shield_per_loop).min(profile.shield);
             }
             unit.unharmed = (unit.unharmed + 1.0).min(field.shield_delay_loops);
+            if profile.greatest_energy > 0.0 {
+                unit.energy = (unit.energy + profile.energy_per_loop).min(profile.greatest_energy);
+            }
             if profile.life_per_loop > 0.0 {
                 unit.life = (unit.life + profile.life_per_loop).min(profile.life);
             }
@@ -320,6 +372,6 @@ fn struck(shield: f32, life: f32, effect: Effect) -> (f32, f32) {
     (0.0, (life - damage).max(0.0))
 }
 
-fn small(index: usize) -> UnitIndex {
+pub(super) fn small(index: usize) -> UnitIndex {
     UnitIndex::try_from(index).expect("a battle has ≤ 256 units")
 }

@@ -10,6 +10,7 @@
 mod battle;
 mod chance;
 mod combat;
+mod healing;
 mod movement;
 mod neighbours;
 mod opponent;
@@ -19,8 +20,8 @@ mod state;
 
 pub use battle::Battle;
 pub use chance::Chance;
-pub use placement::spread_around;
-pub use profile::{Battlefield, Profile, Strike};
+pub use placement::{Taken, spread_around};
+pub use profile::{Battlefield, Care, Profile, Strike, Sweep};
 pub use state::{BattleState, Blow, Missile, Order, Stance, Team, Unit, UnitIndex};
 
 #[cfg(test)]

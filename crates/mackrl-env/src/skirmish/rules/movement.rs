@@ -5,7 +5,7 @@
 //! The engine's own steering is not known; what a player would recognise is kept: walkers push idle friends aside, nobody
 //! pushes a unit that is attacking, enemies block each other, and units slide round obstacles instead of stopping.
 
-use crate::skirmish::rules::Battle;
+use crate::skirmish::{rules::Battle, terrain::Terrain};
 
 /// How firmly a unit stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,8 +63,9 @@ impl Battle {
         self.scratch.steps.x.copy_from_slice(&self.state.x);
         self.scratch.steps.y.copy_from_slice(&self.state.y);
         for index in 0..self.state.units.len() {
-            if let Some(to) = self.scratch.destination[index] {
-                self.step_forward(index, to);
+            match self.scratch.destination[index] {
+                Some(to) => self.step_forward(index, to),
+                None => self.state.units[index].pace = 0.0,
             }
         }
         for _ in 0..PUSH_ROUNDS {
@@ -79,14 +80,18 @@ impl Battle {
     fn step_forward(&mut self, index: usize, to: [f32; 2]) {
         let (x, y) = (self.state.x[index], self.state.y[index]);
         let profile = &self.field.profiles[usize::from(self.state.units[index].kind)];
-        let terrain = &self.field.terrain;
-        let [to_x, to_y] = terrain.waypoint([x, y], to, profile.inner_radius);
+        let [to_x, to_y] = match self.field.terrain.for_layer(profile.layer) {
+            Some(terrain) => terrain.waypoint([x, y], to, profile.inner_radius),
+            None => to,
+        };
         let (dx, dy) = (to_x - x, to_y - y);
         let distance = (dx * dx + dy * dy).sqrt();
         if distance == 0.0 {
             return;
         }
-        let stride = profile.speed.min(distance);
+        let unit = &mut self.state.units[index];
+        unit.pace = (unit.pace + profile.acceleration).min(profile.speed);
+        let stride = unit.pace.min(distance);
         let ahead = [dx / distance, dy / distance];
         let [way_x, way_y] = self.way_round(index, Wish { ahead, distance });
         self.scratch.steps.x[index] = x + way_x * stride;
@@ -187,10 +192,10 @@ impl Battle {
                 continue;
             }
             let profile = &self.field.profiles[usize::from(unit.kind)];
-            let (x, y) = self
-                .field
-                .terrain
-                .pushed_out_of_walls(new_x, new_y, profile.inner_radius);
+            let (x, y) = match self.field.terrain.for_layer(profile.layer) {
+                Some(terrain) => terrain.pushed_out_of_walls(new_x, new_y, profile.inner_radius),
+                None => Terrain::within_map(new_x, new_y),
+            };
             let back = (x - new_x).abs() + (y - new_y).abs();
             if unit.detour_loops > 0 && back > 0.5 * profile.speed {
                 unit.detour = -unit.detour;

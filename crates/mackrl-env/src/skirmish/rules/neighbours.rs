@@ -4,7 +4,10 @@
 //! somebody has moved far enough that they could miss one. They hold more than is near, never less, so that what movement
 //! computes does not depend on when they were renewed: a battle that is restored from its state goes on to the same bits.
 
-use crate::skirmish::rules::{BattleState, Battlefield, movement::LOOKAHEAD};
+use crate::skirmish::{
+    rules::{BattleState, Battlefield, movement::LOOKAHEAD},
+    unit_types::Layer,
+};
 
 /// Gap beyond which a pair is not listed, on top of the gap that movement asks about.
 const SKIN: f32 = 2.0;
@@ -24,6 +27,7 @@ pub(super) struct Neighbours {
     listed_y: Vec<f32>,
     radius: Vec<f32>,
     is_enemy: Vec<bool>,
+    is_on_ground: Vec<bool>,
     is_valid: bool,
 }
 
@@ -36,6 +40,7 @@ impl Neighbours {
         self.listed_y.resize(units, 0.0);
         self.radius.resize(units, 0.0);
         self.is_enemy.resize(units, false);
+        self.is_on_ground.resize(units, true);
         self.is_valid = false;
     }
 
@@ -78,7 +83,9 @@ impl Neighbours {
         self.listed_x.copy_from_slice(&state.x);
         self.listed_y.copy_from_slice(&state.y);
         for (index, unit) in state.units.iter().enumerate() {
-            self.radius[index] = field.profiles[usize::from(unit.kind)].separation_radius;
+            let profile = &field.profiles[usize::from(unit.kind)];
+            self.radius[index] = profile.separation_radius;
+            self.is_on_ground[index] = profile.layer == Layer::Ground;
             self.is_enemy[index] = unit.team == crate::skirmish::rules::Team::Enemy;
         }
         self.list.clear();
@@ -105,7 +112,10 @@ impl Neighbours {
         for other in range {
             let (dx, dy) = (state.x[other] - x, state.y[other] - y);
             let near = reach + self.radius[other];
-            if dx * dx + dy * dy < near * near && state.units[other].is_alive() {
+            if dx * dx + dy * dy < near * near
+                && state.units[other].is_alive()
+                && self.is_on_ground[index] == self.is_on_ground[other]
+            {
                 self.list
                     .push(u8::try_from(other).expect("a battle has ≤ 256 units"));
             }

@@ -1,6 +1,17 @@
 //! Where the units of a group appear.
 
-use crate::skirmish::{rules::Profile, terrain::Terrain};
+use crate::skirmish::{rules::Profile, terrain::Terrain, unit_types::Layer};
+
+/// A place that somebody has.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Taken {
+    /// Its centre.
+    pub at: [f32; 2],
+    /// Separation radius of who is there.
+    pub radius: f32,
+    /// Layer of who is there.
+    pub layer: Layer,
+}
 
 /// Edge of the lattice on which places are tried, in map units.
 const LATTICE: f32 = 0.25;
@@ -11,8 +22,8 @@ const REACH: i32 = 64;
 /// stands on it and the others surround it compactly. Of equally near places those towards `front`, where the other side is,
 /// are taken first, then those of smaller y: armies that face each other stand as mirror images.
 ///
-/// The engine's own search is not known; this stands in for it. `taken` holds (x, y, separation radius) of everybody placed
-/// before and is extended.
+/// The engine's own search is not known; this stands in for it. `taken` holds everybody placed before and is
+/// extended.
 ///
 /// Returns `None` if there is no room.
 #[must_use]
@@ -21,7 +32,7 @@ pub fn spread_around(
     front: [f32; 2],
     profiles: &[&Profile],
     terrain: &Terrain,
-    taken: &mut Vec<(f32, f32, f32)>,
+    taken: &mut Vec<Taken>,
 ) -> Option<Vec<[f32; 2]>> {
     let forward = [front[0] - point[0], front[1] - point[1]];
     // Adding zero turns −0 into 0, so that places beside the point are equally far ahead for either army.
@@ -37,7 +48,6 @@ pub fn spread_around(
     profiles
         .iter()
         .map(|profile| {
-            let radius = profile.separation_radius;
             let place = offsets
                 .iter()
                 .map(|&(dy, dx)| {
@@ -47,22 +57,25 @@ pub fn spread_around(
                     ]
                 })
                 .find(|place| is_free(*place, profile, terrain, taken))?;
-            taken.push((place[0], place[1], radius));
+            taken.push(Taken {
+                at: place,
+                radius: profile.separation_radius,
+                layer: profile.layer,
+            });
             Some(place)
         })
         .collect()
 }
 
-fn is_free(
-    [x, y]: [f32; 2],
-    profile: &Profile,
-    terrain: &Terrain,
-    taken: &[(f32, f32, f32)],
-) -> bool {
-    let is_clear_of_units = taken.iter().all(|(other_x, other_y, radius)| {
-        let (dx, dy) = (x - other_x, y - other_y);
-        let apart = radius + profile.separation_radius;
-        dx * dx + dy * dy >= apart * apart
+fn is_free([x, y]: [f32; 2], profile: &Profile, terrain: &Terrain, taken: &[Taken]) -> bool {
+    let is_clear_of_units = taken.iter().all(|other| {
+        let (dx, dy) = (x - other.at[0], y - other.at[1]);
+        let apart = other.radius + profile.separation_radius;
+        !profile.layer.collides_with(other.layer) || dx * dx + dy * dy >= apart * apart
     });
-    is_clear_of_units && terrain.pushed_out_of_walls(x, y, profile.inner_radius) == (x, y)
+    let off_walls = terrain.for_layer(profile.layer).map_or_else(
+        || Terrain::within_map(x, y),
+        |terrain| terrain.pushed_out_of_walls(x, y, profile.inner_radius),
+    );
+    is_clear_of_units && off_walls == (x, y)
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::skirmish::{
     terrain::Terrain,
-    unit_types::{Attribute, Delivery, LOOPS_PER_SECOND, Plane, UnitType, UnitTypes, Weapon},
+    unit_types::{Attribute, Delivery, Heal, LOOPS_PER_SECOND, Layer, UnitType, UnitTypes, Weapon},
 };
 
 /// What never changes during a battle.
@@ -41,6 +41,16 @@ pub struct Profile {
     pub life_per_loop: f32,
     /// Map units a loop.
     pub speed: f32,
+    /// Map units a loop by which its speed grows in a loop.
+    pub acceleration: f32,
+    /// Where it moves.
+    pub layer: Layer,
+    /// Energy at the start.
+    pub energy: f32,
+    /// Full energy; 0 for units that cast nothing.
+    pub greatest_energy: f32,
+    /// Energy that comes back in a loop.
+    pub energy_per_loop: f32,
     /// Radius that ranges are measured from.
     pub radius: f32,
     /// Radius that keeps units apart.
@@ -51,6 +61,40 @@ pub struct Profile {
     pub scan_range: f32,
     /// The weapon, if any.
     pub strike: Option<Strike>,
+    /// How it heals, if it does.
+    pub care: Option<Care>,
+}
+
+/// How a unit heals, in loops and map units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Care {
+    /// Greatest distance from edge to edge.
+    pub range: f32,
+    /// Distance from edge to edge within which it looks for patients by itself.
+    pub autocast_range: f32,
+    /// Least energy with which it begins by itself.
+    pub autocast_energy: f32,
+    /// Life that it gives in a loop.
+    pub life_per_loop: f32,
+    /// Energy that a point of life costs.
+    pub energy_per_life: f32,
+    /// Whether it can heal units of each kind.
+    pub can_heal: Vec<bool>,
+}
+
+/// Beams that sweep across a target, in loops and map units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sweep {
+    /// Distances of the sweep's points from the target, left to right.
+    pub points: Vec<f32>,
+    /// Distance from a point to a victim's edge within which a beam touches it.
+    pub radius: f32,
+    /// Loops between two points.
+    pub interval: f32,
+    /// Loops from the touch to the hit.
+    pub delay: f32,
+    /// Loops from the start to the hit on the target.
+    pub target_delay: f32,
 }
 
 /// A weapon, in loops and map units.
@@ -74,6 +118,8 @@ pub struct Strike {
     pub missile_speed: Option<f32>,
     /// Distance from its centre to a victim's edge at which the attacker's own explosion harms, if it explodes.
     pub burst_radius: Option<f32>,
+    /// Its beams, if it has such.
+    pub sweep: Option<Sweep>,
     /// Against each kind: whether it can be attacked, and what a hit does to shields and to life.
     pub effects: Vec<Effect>,
 }
@@ -122,10 +168,21 @@ impl Profile {
             shield: unit.shield,
             life_per_loop: unit.life_regeneration_per_s / loops,
             speed: unit.speed / loops,
+            acceleration: unit
+                .acceleration
+                .map_or(unit.speed, |acceleration| acceleration / loops)
+                / loops,
+            layer: unit.layer,
+            energy: unit.energy.map_or(0.0, |energy| energy.initial),
+            greatest_energy: unit.energy.map_or(0.0, |energy| energy.maximum),
+            energy_per_loop: unit
+                .energy
+                .map_or(0.0, |energy| energy.regeneration_per_s / loops),
+            care: unit.heal.as_ref().map(|heal| Care::new(heal, types)),
             radius: unit.radius,
             separation_radius: unit.separation_radius,
             inner_radius: unit.inner_radius,
-            scan_range: weapon_range.max(data.scan_range),
+            scan_range: (weapon_range + data.scan_margin).max(data.scan_range),
             strike: unit.weapon.as_ref().map(|weapon| Strike {
                 range: weapon.range,
                 range_slop: weapon.range_slop,
@@ -136,17 +193,20 @@ impl Profile {
                 hit_interval: weapon.hit_interval_s * loops,
                 missile_speed: match weapon.delivery {
                     Delivery::Missile { speed } => Some(speed / loops),
-                    Delivery::Instant | Delivery::Burst { .. } => None,
+                    _ => None,
                 },
                 burst_radius: match weapon.delivery {
                     Delivery::Burst { radius, .. } => Some(radius),
-                    Delivery::Instant | Delivery::Missile { .. } => None,
+                    _ => None,
                 },
+                sweep: Sweep::of(weapon.delivery),
                 effects: types
                     .iter()
                     .map(|target| Effect {
-                        // No unit of these maps flies yet; those that do will say so in their file.
-                        can_hit: weapon.targets.contains(&Plane::Ground),
+                        can_hit: weapon
+                            .targets
+                            .iter()
+                            .any(|plane| target.layer.is_in(*plane)),
                         damage: damage_of_hit(weapon, target),
                         armour: target.armour,
                         minimum: data.minimum_damage,
@@ -160,6 +220,51 @@ impl Profile {
     #[must_use]
     pub fn is_immobile(&self) -> bool {
         self.speed == 0.0
+    }
+}
+
+impl Care {
+    fn new(heal: &Heal, types: &[&UnitType]) -> Self {
+        Self {
+            range: heal.range,
+            autocast_range: heal.autocast_range,
+            autocast_energy: heal.autocast_energy,
+            life_per_loop: heal.life_per_s / LOOPS_PER_SECOND,
+            energy_per_life: heal.energy_per_life,
+            can_heal: types
+                .iter()
+                .map(|patient| patient.has(heal.patients))
+                .collect(),
+        }
+    }
+}
+
+impl Sweep {
+    fn of(delivery: Delivery) -> Option<Self> {
+        let Delivery::Sweep {
+            half_width,
+            spacing,
+            radius,
+            interval_s,
+            delay_s,
+            target_delay_s,
+        } = delivery
+        else {
+            return None;
+        };
+        let mut points = Vec::new();
+        let mut point = -half_width;
+        while point <= half_width + 1e-3 {
+            points.push(point);
+            point += spacing;
+        }
+        Some(Self {
+            points,
+            radius,
+            interval: interval_s * LOOPS_PER_SECOND,
+            delay: delay_s * LOOPS_PER_SECOND,
+            target_delay: target_delay_s * LOOPS_PER_SECOND,
+        })
     }
 }
 

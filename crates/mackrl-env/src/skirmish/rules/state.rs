@@ -48,6 +48,11 @@ pub enum Order {
     },
     /// Fight the nearest unit of the other side, wherever it is.
     Hunt,
+    /// Go near a friend and heal it until it is whole.
+    Heal {
+        /// The friend.
+        target: UnitIndex,
+    },
 }
 
 /// What a unit is, has and does.
@@ -63,9 +68,13 @@ pub struct Unit {
     pub life: f32,
     /// Shield points.
     pub shield: f32,
+    /// Energy; 0 for units that cast nothing.
+    pub energy: f32,
+    /// Map units a loop at which it moves, for units that gather speed.
+    pub pace: f32,
     /// What it was told.
     pub order: Order,
-    /// Whom an aggressive unit has chosen to fight.
+    /// Whom an aggressive unit has chosen to fight, or to heal.
     pub quarry: Option<UnitIndex>,
     /// Where it stood when it chose its quarry.
     pub chase_from: [f32; 2],
@@ -166,7 +175,13 @@ impl BattleState {
             ] {
                 hash.add(number.to_bits());
             }
-            for number in [unit.unharmed, unit.call_wait, unit.rescan] {
+            for number in [
+                unit.unharmed,
+                unit.call_wait,
+                unit.rescan,
+                unit.energy,
+                unit.pace,
+            ] {
                 hash.add(number.to_bits());
             }
             hash.add(unit.swing.map_or(u32::MAX, f32::to_bits));
@@ -209,6 +224,7 @@ impl Fnv {
             Order::Attack { target } => (2, [f32::from(target), 0.0]),
             Order::AttackMove { to } => (3, to),
             Order::Hunt => (4, [0.0; 2]),
+            Order::Heal { target } => (5, [f32::from(target), 0.0]),
         };
         self.add(kind);
         self.add_point(numbers);

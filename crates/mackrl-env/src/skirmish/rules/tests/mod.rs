@@ -10,7 +10,9 @@ use crate::{
     },
 };
 
+mod colossus;
 mod explosions;
+mod healing;
 mod movement;
 mod reflexes;
 mod regeneration;
