@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::config::{
-    Algorithm, CommonKnowledgeFeatures, ConfigError, Delegation, EnvironmentConfig, OptimiserKind, Origin,
-    PartitionChoice, Setting,
+    Algorithm, CommonKnowledgeFeatures, ConfigError, Delegation, EnvironmentConfig, OptimiserKind,
+    Origin, PartitionChoice, Setting,
     settings::{Violation, section},
 };
 
