@@ -13,7 +13,8 @@ fn main() -> Result<(), MakeError> {
         "{:>14} {:>12} {:>6} {:>7} {:>7}",
         "map", "policy", "wins", "return", "length"
     );
-    for name in registry::names() {
+    let skirmishes = registry::names().into_iter();
+    for name in skirmishes.filter(|&name| name != registry::MATRIX_GAME) {
         let mut environment = registry::make(name, &SkirmishSettings::default())?;
         for policy in ScriptedPolicy::ALL {
             let [wins, total, steps] = play(environment.as_mut(), policy, episodes);

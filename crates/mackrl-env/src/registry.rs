@@ -6,13 +6,17 @@ use thiserror::Error;
 
 use crate::{
     Environment, EnvironmentSpec,
+    matrix_game::{InvalidProbability, MatrixGame, MatrixGameSettings},
     skirmish::{
         Scenario, Skirmish, SkirmishError, SkirmishSettings, scenario, unit_types::UnitTypes,
     },
 };
 
+/// The matrix game's name; all other names are those of skirmishes.
+pub const MATRIX_GAME: &str = "matrix-game";
+
 /// Why an environment could not be built.
-#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum MakeError {
     /// Nothing has this name.
@@ -26,20 +30,37 @@ pub enum MakeError {
     /// The skirmish could not be set up.
     #[error(transparent)]
     Skirmish(#[from] SkirmishError),
+    /// The matrix game could not be set up.
+    #[error(transparent)]
+    MatrixGame(#[from] InvalidProbability),
 }
 
-/// Names of all environments, in the order in which they are listed to users.
+/// Names of all environments, in the order in which they are listed to users: the skirmishes, then [`MATRIX_GAME`].
 #[must_use]
 pub fn names() -> Vec<&'static str> {
-    scenario::map_names()
+    let mut names = scenario::map_names();
+    names.push(MATRIX_GAME);
+    names
 }
 
-/// Builds the environment called `name`; `settings` concern skirmishes only.
+/// Builds the environment called `name`. `settings` concern skirmishes only; the matrix game has its own
+/// ([`make_matrix_game`]) and is built with their defaults here.
 ///
 /// # Errors
 /// [`MakeError::UnknownName`] with the nearest name, or what is wrong with the settings.
 pub fn make(name: &str, settings: &SkirmishSettings) -> Result<Box<dyn Environment>, MakeError> {
+    if name == MATRIX_GAME {
+        return Ok(Box::new(make_matrix_game(MatrixGameSettings::default())?));
+    }
     Ok(Box::new(make_skirmish(name, settings)?))
+}
+
+/// Builds the matrix game.
+///
+/// # Errors
+/// [`MakeError::MatrixGame`] if the probability of common knowledge is not in [0, 1].
+pub fn make_matrix_game(settings: MatrixGameSettings) -> Result<MatrixGame, MakeError> {
+    Ok(MatrixGame::new(settings)?)
 }
 
 /// Builds the skirmish on the map called `name`.

@@ -8,7 +8,10 @@ use mackrl::{
     policy::{DELEGATE, PolicyTable},
 };
 use mackrl_env::{EpisodeKey, Stream};
-use support::{MASKED, Tables, assert_close};
+use support::{
+    MASKED, Tables, assert_close,
+    team::{Team, keys, norm},
+};
 
 /// `Σ_a log π_a(u_a)`, in the order in which a partition names the agents.
 fn independent(tables: &Tables, actions_n: &[mackrl_env::Action]) -> f64 {
@@ -173,4 +176,93 @@ fn single_precision_gives_the_same_numbers_with_fewer_digits() {
             assert_close(f64::from(*found), expected, 1e-5);
         }
     }
+}
+
+/// A hierarchy and a Central-V team with the same agent controllers, and their parameters.
+fn hierarchy_and_central_v(settings: &[&str], delegation: &str) -> [(Team, Vec<f32>); 2] {
+    let mackrl = Team::new(&[settings, &["policy.hidden=11", delegation]].concat());
+    let algorithm = "policy.algorithm=central-v";
+    let central = Team::new(&[settings, &["policy.hidden=11", algorithm]].concat());
+    let parameters = mackrl.policy.initialise(3);
+    let agents = mackrl.places("agent_controller");
+    let own = agents.iter().map(|&place| parameters[place]).collect();
+    [(mackrl, parameters), (central, own)]
+}
+
+#[test]
+fn the_hierarchy_that_always_delegates_is_central_v() {
+    for map in ["3m", "2s3z", "matrix-game"] {
+        let map = format!("env.map={map}");
+        let [(mackrl, parameters), (central, own)] =
+            hierarchy_and_central_v(&[&map], "policy.delegation=always");
+        let found = mackrl.learnable(&parameters, &keys(5));
+        let expected = central.learnable(&own, &keys(5));
+        assert_eq!(found.episodes, expected.episodes, "{map}");
+        assert_close(found.objective, expected.objective, 1e-5);
+        let agents = found.gradient_at(&mackrl.places("agent_controller"));
+        let places: Vec<usize> = (0..own.len()).collect();
+        let central_gradient = expected.gradient_at(&places);
+        let difference: Vec<f64> = (agents.iter().zip(&central_gradient))
+            .map(|(found, expected)| found - expected)
+            .collect();
+        let scale = norm(&central_gradient);
+        assert!(scale > 0.1, "{map}: nothing was learnt, |g| = {scale}");
+        assert!(norm(&difference) < 1e-5 * scale, "{map}: agents differ");
+        for upper in ["pair_selector", "pair_controller"] {
+            let gradient = found.gradient_at(&mackrl.places(upper));
+            assert!(norm(&gradient) < 1e-5 * scale, "{map}: {upper} learns");
+        }
+    }
+}
+
+#[test]
+fn never_delegating_two_who_see_each_other_is_a_joint_learner() {
+    let team = Team::new(&[
+        "env.map=matrix-game",
+        "env.matrix_game.common_knowledge=1.0",
+        "policy.delegation=never",
+        "policy.hidden=7",
+    ]);
+    assert!(team.places("pair_selector").is_empty(), "one partition");
+    let agents = team.places("agent_controller");
+    let mut parameters = team.policy.initialise(3);
+    let played = team.learnable(&parameters, &keys(13));
+    assert!(norm(&played.gradient_at(&agents)) == 0.0, "agents learn");
+    assert!(
+        norm(&played.gradient_at(&team.places("pair_controller"))) > 0.1,
+        "the pair does not learn"
+    );
+    for place in agents {
+        parameters[place] += 1.0;
+    }
+    let again = team.learnable(&parameters, &keys(13));
+    assert_eq!(played.episodes, again.episodes);
+    assert_eq!(played.objective, again.objective);
+}
+
+#[test]
+fn never_delegating_without_common_knowledge_is_central_v() {
+    let settings = [
+        "env.map=matrix-game",
+        "env.matrix_game.common_knowledge=0.0",
+    ];
+    let [(mackrl, parameters), (central, own)] =
+        hierarchy_and_central_v(&settings, "policy.delegation=never");
+    let found = mackrl.learnable(&parameters, &keys(13));
+    let expected = central.learnable(&own, &keys(13));
+    assert_eq!(found.episodes, expected.episodes);
+    assert_close(found.objective, expected.objective, 1e-6);
+    assert!(norm(&found.gradient_at(&mackrl.places("pair_controller"))) == 0.0);
+}
+
+#[test]
+fn two_agents_have_one_partition_whatever_the_schedule() {
+    let play = |partitions: &str| {
+        let team = Team::new(&["env.map=matrix-game", "policy.hidden=7", partitions]);
+        let played = team.learnable(&team.policy.initialise(3), &keys(11));
+        (played.episodes, played.objective, played.gradient)
+    };
+    let all = play("policy.partitions=all");
+    assert_eq!(all, play("policy.partitions=round-robin"));
+    assert_eq!(all, play("policy.partitions=sampled:1"));
 }

@@ -33,4 +33,4 @@ pub use presets::{Preset, presets};
 pub use sections::{Config, ExplorationConfig, LearnerConfig, PolicyConfig, RunConfig, TestConfig};
 pub use settings::Setting;
 
-pub use crate::common_knowledge::CommonKnowledgeFeatures;
+pub use crate::{common_knowledge::CommonKnowledgeFeatures, hierarchy::Delegation};

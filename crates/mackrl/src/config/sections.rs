@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::config::{
-    Algorithm, CommonKnowledgeFeatures, ConfigError, EnvironmentConfig, OptimiserKind, Origin,
-    PartitionChoice, Setting,
+    Algorithm, CommonKnowledgeFeatures, ConfigError, Delegation, EnvironmentConfig, OptimiserKind,
+    Origin, PartitionChoice, Setting,
     settings::{Violation, section},
 };
 
@@ -35,6 +35,8 @@ section! {
         common_knowledge: CommonKnowledgeFeatures = CommonKnowledgeFeatures::Complete, "`complete` or `thin`", |_| true;
         /// Which partitions into pairs the pair selector chooses from; more than 8 agents have too many to take all.
         partitions: PartitionChoice = PartitionChoice::All, "`all`, `round-robin` or `sampled:K` with K >= 1", |_| true;
+        /// When pairs delegate: their controllers decide, or, as ablations, always, or only where no joint action is commonly known.
+        delegation: Delegation = Delegation::Learned, "`learned`, `always` or `never`", |_| true;
         /// Units in each hidden layer and each recurrent state.
         hidden: usize = 64, "an integer in [1, 4096]", |units| (1..=4096).contains(units);
     }

@@ -10,10 +10,8 @@
 //! learning (JAL) never does. They are kept apart from the networks on purpose: with 128 parameters in `f64` they are an
 //! oracle for the rest of the crate and depend on none of it.
 
-mod adam;
 mod game;
 mod optimum;
-mod parallel;
 mod policy;
 mod sweep;
 mod training;

@@ -1,6 +1,9 @@
 //! All runs of Figure 5: every learner at every probability of common knowledge.
 
-use std::num::NonZeroUsize;
+use std::{
+    num::NonZeroUsize,
+    sync::atomic::{AtomicUsize, Ordering},
+};
 
 use mackrl_env::{
     EpisodeKey, Stream,
@@ -10,10 +13,10 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     game::TabularGame,
-    parallel::map_in_order,
     policy::Learner,
     training::{Run, train},
 };
+use crate::parallel::for_each_in_parallel;
 
 /// What is run.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,11 +74,18 @@ pub fn sweep(
         let key = EpisodeKey::new(settings.seed, Stream::Other, run as u64);
         train(&games[point], learner, key, point)
     };
-    let count = Learner::ALL.len() * points * runs;
+    let finished = AtomicUsize::new(0);
+    let mut all: Vec<(usize, Option<Run>)> = (0..Learner::ALL.len() * points * runs)
+        .map(|index| (index, None))
+        .collect();
+    for_each_in_parallel(settings.threads.get(), &mut all, |(index, run)| {
+        *run = Some(job(*index));
+        done(finished.fetch_add(1, Ordering::Relaxed) + 1);
+    });
     Ok(Sweep {
         points,
         runs,
-        all: map_in_order(count, settings.threads, job, done),
+        all: all.into_iter().filter_map(|(_, run)| run).collect(),
     })
 }
 

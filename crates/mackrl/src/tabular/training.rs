@@ -3,10 +3,10 @@
 use mackrl_env::{Draw, EpisodeKey, matrix_game::CommonKnowledge};
 
 use super::{
-    adam::Adam,
     game::TabularGame,
     policy::{Learner, Logits, PARAMETERS, Policy, expected_return, expected_return_and_gradient},
 };
+use crate::nn::{Optimiser, OptimiserKind};
 
 /// Step size of Adam.
 pub const LEARNING_RATE: f64 = 0.05;
@@ -34,13 +34,15 @@ pub struct Run {
 #[must_use]
 pub fn train(game: &TabularGame, learner: Learner, key: EpisodeKey, step: usize) -> Run {
     let mut logits = Logits(std::array::from_fn(|i| key.normal(step, Draw::Setup(i))));
-    let mut adam = Adam::<PARAMETERS>::new(LEARNING_RATE);
+    let mut adam = Optimiser::new(OptimiserKind::ADAM, PARAMETERS);
     let mut train = 0.0;
     for _ in 0..UPDATES {
         let policy = Policy::new(learner, &logits, 1.0);
         let (value, gradient) = expected_return_and_gradient(game, &policy);
         train = value;
-        adam.ascend(&mut logits.0, &gradient);
+        // The optimiser descends: on the negative return.
+        let gradient = gradient.map(|g| -g);
+        adam.step(LEARNING_RATE, &gradient, &mut logits.0);
     }
     let policy = Policy::new(learner, &logits, 1.0);
     let greedy = Policy::new(learner, &logits, GREEDY_TEMPERATURE);

@@ -10,7 +10,7 @@ use crate::{
     central_critic::{CriticSettings, ReturnSettings},
     config::{self, Algorithm, Config, EnvironmentConfig},
     decentralised::Decentralised,
-    hierarchy::{Delegation, HierarchySettings, PairwiseMackrl},
+    hierarchy::{HierarchySettings, PairwiseMackrl},
     learner::LearnerSettings,
     nn::OptimiserKind,
 };
@@ -71,7 +71,7 @@ pub fn policy(config: &Config, world: &World) -> Result<Box<dyn Decentralised>, 
             let settings = HierarchySettings {
                 common_knowledge: config.policy.common_knowledge,
                 partitions: config.policy.partitions.into(),
-                delegation: Delegation::Learned,
+                delegation: config.policy.delegation,
                 hidden,
             };
             let seed = config.run.seed;

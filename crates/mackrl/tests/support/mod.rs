@@ -4,6 +4,8 @@
     reason = "every test file includes this module and uses a part of it"
 )]
 
+pub(crate) mod team;
+
 use mackrl::{
     marginalisation::{MarginalGradient, log_likelihood, log_likelihood_with_gradient},
     partition::{Pair, Partition, all_partitions},

@@ -1,3 +1,4 @@
+use mackrl_env::matrix_game::Payoffs;
 use proptest::prelude::*;
 
 use super::*;
@@ -135,6 +136,24 @@ fn settings_of_the_map_reach_it() {
         .build()
         .unwrap();
     assert_eq!(config.env.settings.move_amount, 5.0);
+    let config = ConfigBuilder::new()
+        .set("env.matrix_game.common_knowledge=0.25")
+        .unwrap()
+        .set("env.matrix_game.payoffs=printed")
+        .unwrap()
+        .build()
+        .unwrap();
+    assert_eq!(config.env.matrix_game.common_knowledge, 0.25);
+    assert_eq!(config.env.matrix_game.payoffs, Payoffs::Printed);
+    assert_eq!(
+        message(
+            ConfigBuilder::new()
+                .set("env.matrix_game.common_knowledge=1.5")
+                .unwrap()
+                .build()
+        ),
+        "--set env.matrix_game.common_knowledge=1.5: `env.matrix_game.common_knowledge` is 1.5, expected a number in [0, 1]"
+    );
 }
 
 #[test]

@@ -1,0 +1,123 @@
+//! The same run gives the same bytes: twice, on any number of threads, in any company.
+
+mod support;
+
+use mackrl::{
+    config::Config,
+    policy::{Behaviour, Recording},
+    rollout::{Episode, RolloutSettings},
+    training::{Evaluation, Trainer, evaluate},
+};
+use mackrl_env::EpisodeKey;
+use support::team::{Team, config, keys};
+
+/// What a run leaves behind: its metrics as JSON without `sys/`, its weights, and how they play.
+#[derive(PartialEq)]
+struct Outcome {
+    metrics: Vec<String>,
+    weights: Vec<u8>,
+    evaluation: Evaluation,
+}
+
+fn short_run(algorithm: &str, seed: &str) -> Config {
+    config(&[
+        "env.map=3m",
+        algorithm,
+        seed,
+        "policy.hidden=16",
+        "run.steps_env=3000",
+        "run.metrics_interval_steps_env=700",
+        "test.interval_steps_env=1500",
+        "test.episodes=11",
+    ])
+}
+
+fn train(config: &Config, threads: usize) -> Outcome {
+    let mut trainer = Trainer::new(config, threads).expect("a run that can begin");
+    let mut metrics = Vec::new();
+    while !trainer.finished() {
+        if let Some(row) = trainer.update().expect("finite gradients") {
+            let entries: Vec<_> = (row.iter())
+                .filter(|(name, _)| !name.starts_with("sys/"))
+                .map(|(name, value)| format!("{name} {:016x}", value.to_bits()))
+                .collect();
+            metrics.push(entries.join("\n"));
+        }
+    }
+    let weights = trainer.weights();
+    let evaluation = evaluate(config, &weights, 37, 5, threads).expect("its own weights");
+    Outcome {
+        metrics,
+        weights,
+        evaluation,
+    }
+}
+
+fn assert_same_run(found: &Outcome, expected: &Outcome, what: &str) {
+    assert_eq!(found.metrics, expected.metrics, "{what}: metrics");
+    assert!(found.weights == expected.weights, "{what}: weights differ");
+    assert_eq!(found.evaluation, expected.evaluation, "{what}: evaluation");
+}
+
+#[test]
+fn a_run_gives_the_same_bytes_twice_and_on_any_number_of_threads() {
+    for algorithm in ["policy.algorithm=mackrl", "policy.algorithm=central-v"] {
+        let config = short_run(algorithm, "run.seed=1");
+        let once = train(&config, 1);
+        assert!(once.metrics.len() >= 5, "rows of training and of tests");
+        assert_same_run(&train(&config, 1), &once, "the second time");
+        for threads in [2, 8] {
+            assert_same_run(&train(&config, threads), &once, &format!("{threads}"));
+        }
+    }
+}
+
+#[test]
+fn another_seed_gives_another_run() {
+    let [first, second] = ["run.seed=1", "run.seed=2"]
+        .map(|seed| train(&short_run("policy.algorithm=mackrl", seed), 1));
+    assert!(first.metrics != second.metrics, "the same metrics");
+    assert!(first.weights != second.weights, "the same weights");
+}
+
+/// Plays `keys` with `shard_size` environments to an actor.
+fn play(team: &Team, keys: &[EpisodeKey], shard_size: usize, behaviour: Behaviour) -> Vec<Episode> {
+    let weights = team.policy.weights(&team.policy.initialise(3));
+    let mut rollout = team.rollout(keys.len() + 2, shard_size);
+    let settings = RolloutSettings {
+        behaviour,
+        recording: Recording::ForLearning,
+    };
+    rollout
+        .play(&weights, keys, settings)
+        .expect("masks agree with the world");
+    let batches = rollout.batches();
+    batches.flat_map(|batch| batch.episodes.clone()).collect()
+}
+
+#[test]
+fn an_episode_is_a_function_of_its_key_whoever_is_played_beside_it() {
+    let keys = keys(7);
+    for (map, partitions) in [
+        ("3m", "all"),
+        ("2s3z", "round-robin"),
+        ("matrix-game", "all"),
+    ] {
+        let map = format!("env.map={map}");
+        let partitions = format!("policy.partitions={partitions}");
+        let team = Team::new(&[&map, &partitions, "policy.hidden=13"]);
+        for behaviour in [Behaviour::sampled(0.3), Behaviour::GREEDY] {
+            let alone: Vec<Episode> = (keys.iter())
+                .flat_map(|&key| play(&team, &[key], 1, behaviour))
+                .collect();
+            for shard_size in [1, 2, 3, 9] {
+                let together = play(&team, &keys, shard_size, behaviour);
+                assert!(together == alone, "{map}, shards of {shard_size}");
+            }
+            let backwards: Vec<EpisodeKey> = keys.iter().rev().copied().collect();
+            let mut reversed = play(&team, &backwards, 4, behaviour);
+            reversed.reverse();
+            assert!(reversed == alone, "{map}, in another order");
+        }
+    }
+}

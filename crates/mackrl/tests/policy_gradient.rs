@@ -1,0 +1,120 @@
+//! The gradient that the learner follows, through the marginal, the softmax and all recurrent networks, against finite
+//! differences of Σ w log p(u) over episodes in which agents die.
+//!
+//! Each layer alone is compared in double precision elsewhere. Here the whole policy is, as it runs, so in single precision:
+//! the derivative along a direction, from objectives whose rounding errors are far smaller than their differences.
+
+mod support;
+
+use mackrl::rollout::Episode;
+use support::team::{Played, Team, keys, norm};
+
+/// A team, its parameters and what they did.
+struct Subject {
+    team: Team,
+    parameters: Vec<f32>,
+    played: Played,
+    episodes: u64,
+}
+
+impl Subject {
+    fn new(settings: &[&str], episodes: u64) -> Self {
+        let team = Team::new(&[settings, &["policy.hidden=5"]].concat());
+        let parameters = team.policy.initialise(3);
+        let played = team.learnable(&parameters, &keys(episodes));
+        Self {
+            team,
+            parameters,
+            played,
+            episodes,
+        }
+    }
+
+    /// (J(θ + h d) − J(θ − h d)) / 2h, without the term in h² (Richardson). A draw is compared with cumulative
+    /// probabilities, so a small h leaves all actions as they were, which is asserted.
+    fn slope(&self, direction: &[f64], h: f64) -> f64 {
+        let central = |h: f64| {
+            let [above, below] = [h, -h].map(|h| {
+                let moved: Vec<f32> = (self.parameters.iter().zip(direction))
+                    .map(|(&parameter, d)| mackrl::Real::from_f64(f64::from(parameter) + h * d))
+                    .collect();
+                let played = self.team.learnable(&moved, &keys(self.episodes));
+                assert!(played.episodes == self.played.episodes, "an action changed");
+                played.objective
+            });
+            (above - below) / (2.0 * h)
+        };
+        (4.0 * central(h / 2.0) - central(h)) / 3.0
+    }
+
+    /// The part of the gradient that belongs to tensors named so, scaled to length 1, and zero elsewhere.
+    fn direction(&self, controller: &str) -> Vec<f64> {
+        let mut direction = vec![0.0; self.parameters.len()];
+        let places = self.team.places(controller);
+        let length = norm(&self.played.gradient_at(&places));
+        assert!(
+            length > 0.05,
+            "{controller} has hardly a gradient: {length}"
+        );
+        for place in places {
+            direction[place] = f64::from(self.played.gradient[place]) / length;
+        }
+        direction
+    }
+
+    /// Largest |g·d − slope| over several directions d, relative to |g|: the gradient's part in each controller, and that
+    /// part with its entries in another order.
+    fn discrepancy(&self, gradient: &[f64], h: f64) -> f64 {
+        let controllers = ["pair_selector", "pair_controller", "agent_controller"];
+        let existing = (controllers.iter()).filter(|name| !self.team.places(name).is_empty());
+        let mut worst = 0.0_f64;
+        for controller in existing {
+            let along = self.direction(controller);
+            let alternating: Vec<f64> = (along.iter().enumerate())
+                .map(|(i, d)| if i % 2 == 0 { *d } else { -d })
+                .collect();
+            for direction in [along, alternating] {
+                let product: f64 = gradient.iter().zip(&direction).map(|(g, d)| g * d).sum();
+                let length = norm(&self.played.gradient_at(&self.team.places(controller)));
+                let difference = (product - self.slope(&direction, h)).abs();
+                worst = worst.max(difference / length);
+            }
+        }
+        worst
+    }
+}
+
+/// Checks a gradient, and that the check would not accept one with a wrong part.
+fn check(settings: &[&str], episodes: u64, h: f64) -> Subject {
+    let subject = Subject::new(settings, episodes);
+    let everything: Vec<usize> = (0..subject.parameters.len()).collect();
+    let gradient = subject.played.gradient_at(&everything);
+    let found = subject.discrepancy(&gradient, h);
+    assert!(found < 0.01, "{settings:?}: relative error {found}");
+    for controller in ["pair_controller", "agent_controller"] {
+        for factor in [-1.0, 0.9] {
+            let mut wrong = gradient.clone();
+            for place in subject.team.places(controller) {
+                wrong[place] *= factor;
+            }
+            let found = subject.discrepancy(&wrong, h);
+            assert!(found > 0.05, "{controller} × {factor} passes: {found}");
+        }
+    }
+    subject
+}
+
+#[test]
+fn the_gradient_of_whole_episodes_is_that_of_their_log_probability() {
+    let subject = check(&["env.map=3m"], 3, 1e-3);
+    let deaths = |episode: &Episode| episode.statistics.dead_allies;
+    assert!(
+        subject.played.episodes.iter().all(|e| deaths(e) > 0),
+        "nobody dies"
+    );
+}
+
+#[test]
+fn the_gradient_of_many_short_episodes_is_that_of_their_log_probability() {
+    check(&["env.map=matrix-game"], 61, 1e-2);
+}
