@@ -25,8 +25,10 @@ pub mod partition;
 pub mod policy;
 mod real;
 pub mod rollout;
+mod stopwatch;
 pub mod tabular;
 pub mod training;
 
 pub use error::Error;
 pub use real::Real;
+pub use stopwatch::{Phase, Stopwatch};
