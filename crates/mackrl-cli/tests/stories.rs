@@ -60,7 +60,10 @@ fn help_teaches_every_command() {
         "reproduce figure7",
         "maps",
         "config",
+        "bench",
         "bench env",
+        "bench update",
+        "bench train",
     ] {
         help += &format!("\n$ mackrl {command} --help\n");
         help += &type_in(&format!("{command} --help")).succeeds();
@@ -150,6 +153,51 @@ fn an_unknown_map_points_to_the_list() {
     error: --map nowhere: unknown map `nowhere`
     hint: `mackrl maps` lists every map
     ");
+}
+
+#[test]
+fn every_measurement_says_what_it_measured() {
+    let measured = |line: &str| -> serde_json::Value {
+        serde_json::from_str(&type_in(line).succeeds()).expect("a JSON object")
+    };
+    let environment = measured("bench env --map 3m --steps 500 --threads 3 --json");
+    assert_eq!(
+        (&environment["steps"], &environment["threads"]),
+        (&500.into(), &3.into())
+    );
+    assert!(
+        environment["env_steps_per_s"].as_f64() > Some(0.0),
+        "{environment}"
+    );
+    let update = measured("bench update --rows 5 --steps 7 --updates 3 --json");
+    assert!(update["min_ms"].as_f64() > Some(0.0), "{update}");
+    assert!(
+        update["median_ms"].as_f64() >= update["min_ms"].as_f64(),
+        "{update}"
+    );
+    for algorithm in ["mackrl", "central-v"] {
+        let line =
+            format!("bench train --steps 300 --algorithm {algorithm} --set test.episodes=3 --json");
+        let training = measured(&line);
+        assert_eq!(training["algorithm"], algorithm);
+        assert!(training["steps"].as_u64() >= Some(300), "{training}");
+        let shares = training["shares"].as_object().expect("an object of shares");
+        let total: f64 = shares.values().filter_map(serde_json::Value::as_f64).sum();
+        assert!((total - 1.0).abs() < 1e-9, "{training}");
+        let finds_knowledge = shares["common_knowledge"].as_f64() > Some(0.0);
+        assert_eq!(finds_knowledge, algorithm == "mackrl", "{training}");
+    }
+}
+
+#[test]
+fn measuring_nothing_is_a_usage_error() {
+    insta::assert_snapshot!(type_in("bench update --rows 0").fails(2), @r"
+    error: invalid value '0' for '--rows <B>': number would be zero for non-zero type
+
+    For more information, try '--help'.
+    ");
+    let unknown = type_in("bench train --map nowhere").fails(64);
+    assert!(unknown.contains("unknown map `nowhere`"), "{unknown}");
 }
 
 #[test]

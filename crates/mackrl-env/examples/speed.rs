@@ -1,22 +1,30 @@
 //! You will see how many steps a second each map plays on one core.
 #![expect(clippy::print_stdout, reason = "an example shows what it found")]
 
-use std::time::Duration;
-
-use mackrl_env::{
-    registry::{self, MakeError},
-    skirmish::{SkirmishSettings, measure_speed},
+use std::{
+    error::Error,
+    time::{Duration, Instant},
 };
 
-fn main() -> Result<(), MakeError> {
-    let names: Vec<String> = std::env::args().skip(1).collect();
+use mackrl_env::{random_play::RandomPlay, registry, skirmish::SkirmishSettings};
+
+const PATIENCE: Duration = Duration::from_millis(300);
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let wanted: Vec<String> = std::env::args().skip(1).collect();
     for name in registry::names() {
-        if !names.is_empty() && !names.iter().any(|wanted| wanted == name) {
+        if !wanted.is_empty() && !wanted.iter().any(|wanted| wanted == name) {
             continue;
         }
-        let mut environment = registry::make(name, &SkirmishSettings::default())?;
-        let speed = measure_speed(environment.as_mut(), Duration::from_millis(1000));
-        println!("{name:>18} {:>9.0} steps/s", speed.steps_per_second());
+        let environment = registry::make(name, &SkirmishSettings::default())?;
+        let mut play = RandomPlay::new(environment, 1);
+        let (start, mut steps) = (Instant::now(), 0);
+        while start.elapsed() < PATIENCE {
+            play.step()?;
+            steps += 1;
+        }
+        let per_second = f64::from(steps) / start.elapsed().as_secs_f64();
+        println!("{name:>18} {per_second:>9.0} steps/s");
     }
     Ok(())
 }

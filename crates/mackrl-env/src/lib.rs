@@ -19,6 +19,7 @@ mod ids;
 pub mod matrix_game;
 mod observations;
 pub mod random;
+pub mod random_play;
 pub mod registry;
 pub mod skirmish;
 

@@ -1,15 +1,26 @@
-//! One update of the pair controllers, one thread: `cargo bench -p mackrl --bench update`.
+//! Learning, on one thread: `cargo bench -p mackrl --bench update`.
 //!
-//! 80 rows are 8 environments with 10 pairs; 6 and 12 rows are what `3m` has.
+//! 80 rows are 8 environments with 10 pairs, as `2s3z` has; 24 are those of `3m`, and 12 those of one of its shards.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use mackrl::nn::benchmark::UpdateProbe;
+use mackrl::{
+    Stopwatch,
+    config::Config,
+    learner::Learner,
+    nn::benchmark::UpdateProbe,
+    policy::{Behaviour, Recording},
+    rollout::{Rollout, RolloutSettings},
+    training::assembly::{self, World},
+};
+use mackrl_env::{EpisodeKey, Stream};
 
 const STEPS: usize = 60;
+const ENVIRONMENTS: usize = 8;
+const SHARD_SIZE: usize = 4;
 
-fn update(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("update");
-    for rows in [80, 24, 12, 6] {
+fn pair_controllers(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("update of the pair controllers");
+    for rows in [80, 24, 12] {
         let mut probe = UpdateProbe::new(UpdateProbe::PAIR_CONTROLLER, rows, STEPS);
         group.bench_function(format!("{rows} rows, {STEPS} steps"), |bencher| {
             bencher.iter(|| probe.run());
@@ -18,5 +29,33 @@ fn update(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, update);
+/// Critic, all three levels and the optimiser, again and again on one recorded batch of 8 episodes of `3m`.
+fn learner(criterion: &mut Criterion) {
+    let config = Config::default();
+    let world = World::new(&config).expect("3m is a map of this program");
+    let policy = assembly::policy(&config, &world).expect("as above");
+    let environments = world.environments(ENVIRONMENTS).expect("as above");
+    let sizes = [world.spec().agents, world.spec().state_size];
+    let mut learner = Learner::new(&*policy, sizes, assembly::learner(&config), 1, 1);
+    let mut rollout = Rollout::new(&*policy, environments, SHARD_SIZE, 1);
+    let keys: Vec<EpisodeKey> = (0..ENVIRONMENTS as u64)
+        .map(|episode| EpisodeKey::new(1, Stream::Training, episode))
+        .collect();
+    let settings = RolloutSettings {
+        behaviour: Behaviour::sampled(0.1),
+        recording: Recording::ForLearning,
+    };
+    rollout
+        .play(learner.weights(), &keys, settings)
+        .expect("actors choose available actions");
+    criterion.bench_function("update of the learner, 8 episodes of 3m", |bencher| {
+        bencher.iter(|| {
+            let batches = rollout.batches().collect();
+            let report = learner.update(&*policy, batches, &mut Stopwatch::default());
+            report.expect("gradients are finite")
+        });
+    });
+}
+
+criterion_group!(benches, pair_controllers, learner);
 criterion_main!(benches);

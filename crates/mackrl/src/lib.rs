@@ -25,11 +25,13 @@ pub mod partition;
 pub mod policy;
 mod real;
 pub mod rollout;
+mod stopwatch;
 pub mod tabular;
 pub mod training;
 
 pub use error::Error;
 pub use real::Real;
+pub use stopwatch::{Phase, Stopwatch};
 
 /// Compiles and runs the examples of README.md.
 #[cfg(doctest)]

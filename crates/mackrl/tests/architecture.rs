@@ -181,7 +181,7 @@ fn allows(rule: &Rule, name: &str, path: &[String]) -> bool {
         return path[0] != "mackrl_env" || rule.sees == Sight::Worlds;
     };
     match path[0].as_str() {
-        // At the root of the crate are its errors, its numbers and its threads, which everybody may use.
+        // At the root of the crate are its errors, its numbers, its threads and its stopwatch, which everybody may use.
         "crate" => {
             let is_shared = starts_upper(item) || item == "parallel";
             item == name || rule.imports.contains(item) || is_shared

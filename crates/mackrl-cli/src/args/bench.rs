@@ -1,10 +1,15 @@
 //! The commands that measure speed.
 
-use std::num::NonZeroU64;
+use std::num::{NonZeroU64, NonZeroUsize};
 
 use clap::{Args, Subcommand};
 
+use crate::args::{ConfigurationArgs, runs::ThreadsArgs};
+
 /// Measure how fast this machine is
+///
+/// Other work on the machine can only make these numbers worse: measure in a quiet moment, more than once, and believe the
+/// best. `benchmarks/` holds measured numbers with their conditions.
 #[derive(Debug, Args)]
 pub(crate) struct BenchArgs {
     #[command(subcommand)]
@@ -14,12 +19,14 @@ pub(crate) struct BenchArgs {
 #[derive(Debug, Subcommand)]
 pub(crate) enum BenchCommand {
     Env(BenchEnvironmentArgs),
+    Update(BenchUpdateArgs),
+    Train(BenchTrainArgs),
 }
 
-/// Environment steps a second, on one core, with random available actions
+/// Environment steps a second, with random available actions
 ///
-/// Every step fills observations, state and action masks. The best of five equal parts is reported too, because other
-/// work on the machine can only slow a part down.
+/// Every step fills observations, state and action masks; nothing is learnt. With several threads, each plays its own
+/// environment. The best of five equal parts is reported too, because other work on the machine can only slow a part down.
 ///
 /// Example: mackrl bench env --map 3m --steps 500000 --json
 #[derive(Debug, Args)]
@@ -28,9 +35,58 @@ pub(crate) struct BenchEnvironmentArgs {
     #[arg(long, value_name = "NAME", default_value = "3m")]
     pub(crate) map: String,
 
-    /// Environment steps to play
+    /// Environment steps to play, summed over threads
     #[arg(long, value_name = "N", default_value = "100000")]
     pub(crate) steps: NonZeroU64,
+
+    /// Threads, each with an environment of its own
+    #[arg(long, value_name = "K", default_value = "1")]
+    pub(crate) threads: NonZeroUsize,
+
+    /// Print a JSON object instead of a table
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Milliseconds that one update of the pair controllers takes, on one thread
+///
+/// Forward and backward pass of a recurrent network 128 → 64 → GRU 64 → 122 with a masked softmax over whole episodes,
+/// clipping and Adam, on made-up data. `benchmarks/peers/compare.py` times the same update in PyTorch and in JAX.
+///
+/// Example: mackrl bench update --rows 80 --steps 60 --json
+#[derive(Debug, Args)]
+pub(crate) struct BenchUpdateArgs {
+    /// Rows of the batch: pairs times environments
+    #[arg(long, value_name = "B", default_value = "80")]
+    pub(crate) rows: NonZeroUsize,
+
+    /// Steps of the episodes
+    #[arg(long, value_name = "T", default_value = "60")]
+    pub(crate) steps: NonZeroUsize,
+
+    /// Updates to time
+    #[arg(long, value_name = "N", default_value = "100")]
+    pub(crate) updates: NonZeroUsize,
+
+    /// Print a JSON object instead of a table
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Environment steps a second in training, and where the time goes
+///
+/// Trains as `mackrl train` does, everything included (simulation, acting, learning, greedy tests), and writes no run folder.
+/// Shares are of wall-clock time; while several threads play, it is divided in the proportions of what they do. --steps is
+/// 100000 unless given.
+///
+/// Example: mackrl bench train --map 2s3z --preset paper --json
+#[derive(Debug, Args)]
+pub(crate) struct BenchTrainArgs {
+    #[command(flatten)]
+    pub(crate) configuration: ConfigurationArgs,
+
+    #[command(flatten)]
+    pub(crate) threads: ThreadsArgs,
 
     /// Print a JSON object instead of a table
     #[arg(long)]

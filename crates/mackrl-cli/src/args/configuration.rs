@@ -6,7 +6,7 @@ use anyhow::Context;
 use clap::Args;
 use mackrl::config::ConfigBuilder;
 
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub(crate) struct ConfigurationArgs {
     /// Map to play, as `mackrl maps` lists it (short for `--set env.map=NAME`)
     #[arg(long, value_name = "NAME", help_heading = "Configuration")]

@@ -7,7 +7,9 @@ mod runs;
 use clap::{Args, Parser, Subcommand};
 
 use crate::reproduce::{figure5::Figure5Options, figure6::Figure6Options, figure7::Figure7Options};
-pub(crate) use bench::{BenchArgs, BenchCommand, BenchEnvironmentArgs};
+pub(crate) use bench::{
+    BenchArgs, BenchCommand, BenchEnvironmentArgs, BenchTrainArgs, BenchUpdateArgs,
+};
 pub(crate) use configuration::ConfigurationArgs;
 pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, TrainArgs};
 

@@ -11,7 +11,6 @@ pub mod rules;
 pub mod scenario;
 pub mod scripted;
 mod settings;
-mod speed;
 pub mod terrain;
 pub mod unit_types;
 
@@ -19,5 +18,4 @@ pub use error::SkirmishError;
 pub use face::{BattleTally, Skirmish, SkirmishKnowledge};
 pub use scenario::Scenario;
 pub use settings::{Compatibility, SkirmishSettings};
-pub use speed::{Speed, measure_speed};
 pub use unit_types::UnitData;

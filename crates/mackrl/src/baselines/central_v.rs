@@ -3,6 +3,7 @@
 use mackrl_env::{Action, AgentId, EnvironmentSpec};
 
 use crate::{
+    Phase, Stopwatch,
     hierarchy::{
         Sampler,
         agent_controller::{AgentController, forced_action, is_alive},
@@ -74,6 +75,7 @@ impl Policy for CentralV {
             team: self.team,
             recording: Recording::Off,
             entropy: (0.0, 0.0),
+            stopwatch: Stopwatch::default(),
         })
     }
 }
@@ -91,6 +93,7 @@ struct CentralVActor {
     recording: Recording,
     /// Sum and count of the agents' entropies.
     entropy: (f64, f64),
+    stopwatch: Stopwatch,
 }
 
 impl CentralVActor {
@@ -161,6 +164,7 @@ impl Actor for CentralVActor {
                 self.memory.record(row, action.index(), b, 1.0);
             }
         }
+        self.stopwatch.lap(Phase::Act);
     }
 
     fn backward(&mut self, weights: &Weights, weight_bt: &[Vec<f32>], gradient: &mut [f32]) -> f64 {
@@ -182,6 +186,10 @@ impl Actor for CentralVActor {
 
     fn report(&self, tally: &mut Tally) {
         tally.add("mackrl/entropy_l3", self.entropy.0, self.entropy.1);
+    }
+
+    fn stopwatch(&mut self) -> &mut Stopwatch {
+        &mut self.stopwatch
     }
 
     fn controller_inputs(&self, b: usize) -> Vec<ControllerInput> {

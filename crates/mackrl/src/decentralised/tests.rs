@@ -4,6 +4,7 @@ use mackrl_env::Action;
 
 use super::*;
 use crate::{
+    Stopwatch,
     config::{Config, ConfigBuilder},
     nn::ParameterLayout,
     policy::{Actor, Recording, Situation, Tally},
@@ -55,6 +56,9 @@ impl Actor for PeekingActor {
     }
     fn report(&self, tally: &mut Tally) {
         self.0.report(tally);
+    }
+    fn stopwatch(&mut self) -> &mut Stopwatch {
+        self.0.stopwatch()
     }
     fn controller_inputs(&self, b: usize) -> Vec<ControllerInput> {
         self.0.controller_inputs(b)

@@ -15,6 +15,7 @@ use super::{
     statistics::HierarchyStatistics,
 };
 use crate::{
+    Phase, Stopwatch,
     common_knowledge::common_knowledge,
     marginalisation::{MarginalGradient, log_likelihood_with_gradient},
     partition::{Pair, PartitionBuffer},
@@ -38,6 +39,7 @@ pub(super) struct PairwiseActor {
     worlds: Vec<World>,
     gradient: MarginalGradient<f32>,
     statistics: HierarchyStatistics,
+    stopwatch: Stopwatch,
     /// Members' available actions, \[2, A\] and \[N, A\].
     pair_available_ga: Vec<bool>,
     team_available_ga: Vec<bool>,
@@ -72,6 +74,7 @@ impl PairwiseActor {
             worlds: (0..environments).map(|_| World::new(&hierarchy)).collect(),
             gradient: MarginalGradient::new(hierarchy.shape, hierarchy.partitions.count()),
             statistics: HierarchyStatistics::new(hierarchy.spec.entities - agents),
+            stopwatch: Stopwatch::default(),
             pair_available_ga: vec![false; 2 * hierarchy.shape.actions],
             team_available_ga: vec![false; agents * hierarchy.shape.actions],
             hierarchy,
@@ -93,6 +96,7 @@ impl PairwiseActor {
             let known = known_entities(situation.observations, b, selector.team()[0], known);
             selector.write_row(memory, row, known, &mut self.team_available_ga);
         }
+        self.stopwatch.lap(Phase::CommonKnowledge);
         // The paper explores at the second and the third level only.
         memory.run(selector.controller(), weights, 0.0);
         for (row, &b) in situation.playing.iter().enumerate() {
@@ -100,6 +104,7 @@ impl PairwiseActor {
                 .log_p_selector_p
                 .copy_from_slice(memory.log_p(row));
         }
+        self.stopwatch.lap(Phase::Act);
     }
 
     /// Advances the controllers of all pairs of living agents.
@@ -129,6 +134,7 @@ impl PairwiseActor {
             let known = known_entities(situation.observations, b, pair.agents()[0], known);
             controller.write_row(memory, row, known, pair, &mut self.pair_available_ga);
         }
+        self.stopwatch.lap(Phase::CommonKnowledge);
         memory.run(
             controller.controller(),
             weights,
@@ -199,8 +205,10 @@ impl PairwiseActor {
         self.statistics
             .observe(&table, &world.path, &world.known_k, &world.alive_n);
         if self.recording == Recording::ForLearning {
+            self.stopwatch.lap(Phase::Act);
             let log_p = log_likelihood_with_gradient(&table, action_n, &mut self.gradient);
             world.log_p_t.push(log_p);
+            self.stopwatch.lap(Phase::Marginal);
         }
         for (last, &action) in world.last_action_n.iter_mut().zip(action_n.iter()) {
             *last = Some(action);
@@ -261,6 +269,7 @@ impl Actor for PairwiseActor {
         for &b in situation.playing {
             self.worlds[b].observe(&self.hierarchy, situation.observations, b);
         }
+        self.stopwatch.lap(Phase::CommonKnowledge);
         self.run_selector(weights, situation);
         self.run_pairs(weights, situation);
         self.run_agents(weights, situation);
@@ -270,8 +279,10 @@ impl Actor for PairwiseActor {
             self.choose(b, situation, action_n);
             if self.recording == Recording::ForLearning {
                 self.record(b, situation, action_n);
+                self.stopwatch.lap(Phase::Marginal);
             }
         }
+        self.stopwatch.lap(Phase::Act);
     }
 
     fn backward(&mut self, weights: &Weights, weight_bt: &[Vec<f32>], gradient: &mut [f32]) -> f64 {
@@ -302,6 +313,10 @@ impl Actor for PairwiseActor {
 
     fn report(&self, tally: &mut Tally) {
         self.statistics.report(tally);
+    }
+
+    fn stopwatch(&mut self) -> &mut Stopwatch {
+        &mut self.stopwatch
     }
 
     fn controller_inputs(&self, b: usize) -> Vec<ControllerInput> {

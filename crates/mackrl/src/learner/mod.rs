@@ -9,7 +9,7 @@
 use mackrl_env::{EpisodeKey, Stream};
 
 use crate::{
-    Error,
+    Error, Phase, Stopwatch,
     central_critic::{CentralCritic, CriticReport, CriticSettings, not_finite},
     nn::{Optimiser, OptimiserKind, clip_gradient_norm, first_not_finite},
     parallel::for_each_in_parallel,
@@ -117,7 +117,7 @@ impl Learner {
         self.updates
     }
 
-    /// Learns from the batch that `shards` hold.
+    /// Learns from the batch that `shards` hold, and books the time that it takes.
     ///
     /// # Equation
     /// `∇J = 1 / (N Σ_b T_b) Σ_{b,t} A_{bt} ∇ log p(u_{bt})` (eq. 6), then one step of the optimiser.
@@ -128,13 +128,16 @@ impl Learner {
         &mut self,
         policy: &dyn Policy,
         shards: Vec<&mut ShardBatch>,
+        stopwatch: &mut Stopwatch,
     ) -> Result<UpdateReport, Error> {
         let episodes: Vec<&Episode> = shards.iter().flat_map(|shard| &shard.episodes).collect();
         let steps: usize = episodes.iter().map(|episode| episode.steps()).sum();
         let critic = self.critic.sweep(&episodes, &mut self.advantage_bt)?;
         let advantages = self.advantage_bt.iter().flatten();
         let advantage_mean = advantages.map(|&a| f64::from(a)).sum::<f64>() / steps as f64;
+        stopwatch.lap(Phase::Critic);
         let objective = self.backward(shards, steps);
+        stopwatch.lap(Phase::Backward);
         let gradient = &mut self.shard_gradients[0];
         if let Some(index) = first_not_finite(gradient) {
             let layout = policy.layout();
@@ -151,6 +154,7 @@ impl Learner {
             .step(self.settings.learning_rate, gradient, &mut self.parameters);
         policy.refresh(&self.parameters, &mut self.weights);
         self.updates += 1;
+        stopwatch.lap(Phase::Optimiser);
         Ok(UpdateReport {
             policy_loss: -objective,
             policy_gradient_norm: norm,

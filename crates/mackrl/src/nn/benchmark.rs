@@ -69,6 +69,20 @@ impl UpdateProbe {
         }
     }
 
+    /// Floating-point operations of an update's matrix products, a multiplication and an addition counted apart. The backward
+    /// pass has two products for each of the forward pass, but none for the gradient of the inputs.
+    #[must_use]
+    pub const fn flop(sizes: NetworkSizes, rows: usize, steps: usize) -> f64 {
+        let NetworkSizes {
+            inputs,
+            hidden,
+            outputs,
+        } = sizes;
+        let first = inputs * hidden;
+        let others = 2 * hidden * 3 * hidden + hidden * outputs;
+        (2 * rows * steps * (2 * first + 3 * others)) as f64
+    }
+
     /// Runs one whole update: the forward pass step by step with the masked log-softmax, the backward pass, clipping, Adam.
     /// Returns the gradient's norm.
     pub fn run(&mut self) -> f64 {
@@ -124,6 +138,12 @@ impl UpdateProbe {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_design_s_update_has_1_09_gflop() {
+        let flop = UpdateProbe::flop(UpdateProbe::PAIR_CONTROLLER, 80, 60);
+        assert!((flop * 1e-9 - 1.09).abs() < 0.005, "{flop}");
+    }
 
     #[test]
     fn an_update_repeats_to_the_bit() {

@@ -17,7 +17,10 @@ use serde::{Deserialize, Serialize};
 pub use tables::{DELEGATE, PolicyShape, PolicyTable};
 pub use tally::Tally;
 
-use crate::nn::{ParameterLayout, RecurrentWeights};
+use crate::{
+    Stopwatch,
+    nn::{ParameterLayout, RecurrentWeights},
+};
 
 /// How a controller turns its distribution into a choice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -132,6 +135,9 @@ pub trait Actor: Send {
 
     /// Adds what was seen since [`Self::begin`] (entropies, delegation, …) to `tally`.
     fn report(&self, tally: &mut Tally);
+
+    /// Measures where the time of this actor and of the environments that it plays in goes, once it is started.
+    fn stopwatch(&mut self) -> &mut Stopwatch;
 
     /// What the controllers of environment `b` read at the latest step.
     fn controller_inputs(&self, b: usize) -> Vec<ControllerInput>;

@@ -13,7 +13,7 @@ pub use episode::Episode;
 pub use shard::{Shard, ShardBatch};
 
 use crate::{
-    Error,
+    Error, Stopwatch,
     parallel::for_each_in_parallel,
     policy::{Behaviour, Policy, Recording, Tally, Weights},
 };
@@ -100,6 +100,11 @@ impl Rollout {
     /// The latest episodes, shard by shard, with the actors that played them.
     pub fn batches(&mut self) -> impl Iterator<Item = &mut ShardBatch> {
         self.shards.iter_mut().map(Shard::batch)
+    }
+
+    /// What measures the shards' time, each shard's alone.
+    pub fn stopwatches(&mut self) -> impl Iterator<Item = &mut Stopwatch> {
+        self.batches().map(|batch| batch.actor.stopwatch())
     }
 
     /// What the actors saw in the latest episodes.

@@ -6,7 +6,7 @@ use mackrl_env::{Action, Environment, EpisodeKey, Observations};
 
 use super::{Episode, RolloutSettings};
 use crate::{
-    Error,
+    Error, Phase,
     policy::{Actor, Situation, Weights},
 };
 
@@ -77,11 +77,13 @@ impl Shard {
             .episodes
             .resize_with(keys.len(), Episode::default);
         self.batch.actor.begin(settings.recording);
+        self.batch.actor.stopwatch().skip();
         for (b, key) in keys.iter().enumerate() {
             self.environments[b].reset(*key, &mut self.observations.row_mut(b));
             self.batch.episodes[b].clear();
             self.batch.episodes[b].remember_state(settings.recording, &self.observations, b);
         }
+        self.batch.actor.stopwatch().lap(Phase::Simulate);
         let mut playing: Vec<usize> = (0..keys.len()).collect();
         for step in 0.. {
             if playing.is_empty() {
@@ -100,6 +102,7 @@ impl Shard {
             for &b in &playing {
                 self.step(b, settings)?;
             }
+            self.batch.actor.stopwatch().lap(Phase::Simulate);
             playing.retain(|&b| self.batch.episodes[b].end.is_none());
         }
         Ok(())

@@ -6,7 +6,7 @@ use mackrl_env::{EpisodeKey, Stream};
 
 use super::{Evaluation, MetricRow, assembly, evaluation::Evaluator, write_weights};
 use crate::{
-    Error,
+    Error, Phase, Stopwatch,
     config::Config,
     decentralised::Decentralised,
     learner::{Learner, UpdateReport},
@@ -30,6 +30,7 @@ pub struct Trainer {
     next_test: u64,
     next_row: u64,
     interval: Interval,
+    stopwatch: Stopwatch,
 }
 
 /// What happened since the last row of metrics.
@@ -62,6 +63,7 @@ impl Trainer {
             next_test: 0,
             next_row: config.run.metrics_interval_steps_env,
             interval: Interval::new(0),
+            stopwatch: Stopwatch::default(),
         })
     }
 
@@ -106,6 +108,19 @@ impl Trainer {
         ])
     }
 
+    /// Starts measuring where the time goes; until then, that costs nothing.
+    pub fn start_stopwatch(&mut self) {
+        self.stopwatch.start();
+        self.rollout.stopwatches().for_each(Stopwatch::start);
+    }
+
+    /// Where the time since [`Self::start_stopwatch`] went: wall-clock time, that of a rollout divided in the proportions of
+    /// what its threads were doing.
+    #[must_use]
+    pub const fn stopwatch(&self) -> &Stopwatch {
+        &self.stopwatch
+    }
+
     /// ε of the bounded softmax now: it falls linearly with the environment steps.
     fn exploration(&self) -> f64 {
         let schedule = &self.config.exploration;
@@ -125,14 +140,19 @@ impl Trainer {
         let keys: Vec<EpisodeKey> = (self.episodes..self.episodes + batch)
             .map(|episode| EpisodeKey::new(seed, Stream::Training, episode))
             .collect();
+        self.stopwatch.lap(Phase::Other);
         self.rollout.play(self.learner.weights(), &keys, settings)?;
+        self.stopwatch.lap_shared_by(self.rollout.stopwatches());
         self.episodes += batch;
         for episode in self.rollout.batches().flat_map(|batch| &batch.episodes) {
             self.steps_env += episode.steps() as u64;
             self.interval.note_episode(episode);
         }
         let batches = self.rollout.batches().collect();
-        let report = self.learner.update(&*self.policy, batches)?;
+        self.stopwatch.lap(Phase::Other);
+        let report = self
+            .learner
+            .update(&*self.policy, batches, &mut self.stopwatch)?;
         self.interval.note_update(&report, exploration);
         self.interval.tally.merge(&self.rollout.tally());
         Ok(())
@@ -140,6 +160,7 @@ impl Trainer {
 
     /// Plays greedy test episodes.
     fn test(&mut self) -> Result<MetricRow, Error> {
+        self.stopwatch.lap(Phase::Other);
         let test = &self.config.test;
         let (seed, first) = (self.config.run.seed, self.tests * test.episodes as u64);
         let evaluation = self
@@ -147,6 +168,7 @@ impl Trainer {
             .play(self.learner.weights(), test.episodes, |episode| {
                 EpisodeKey::new(seed, Stream::Test, first + episode)
             })?;
+        self.stopwatch.lap(Phase::Test);
         self.tests += 1;
         self.next_test = (self.steps_env / test.interval_steps_env + 1) * test.interval_steps_env;
         let mut row = self.row();

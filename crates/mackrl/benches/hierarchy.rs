@@ -1,0 +1,144 @@
+//! What a step of pairwise MACKRL costs beside its environment: `cargo bench -p mackrl --bench hierarchy`.
+//!
+//! Everything is measured in the middle of a battle, where agents see each other and some enemies.
+
+use std::hint::black_box;
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use mackrl::{
+    common_knowledge::common_knowledge,
+    config::ConfigBuilder,
+    marginalisation::{MarginalGradient, log_likelihood_with_gradient},
+    partition::{Pairs, all_partitions},
+    policy::{Actor, Behaviour, PolicyShape, PolicyTable, Recording, Situation, Weights},
+    training::assembly::{self, World},
+};
+use mackrl_env::{Action, Environment, EpisodeKey, Observations, Stream};
+
+/// Environments of a shard in training.
+const ENVIRONMENTS: usize = 4;
+/// Steps after which armies have met.
+const STEPS: usize = 12;
+
+fn common_knowledge_of_all_pairs(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("common knowledge of all pairs");
+    for map in ["3m", "2s3z", "27m_vs_30m"] {
+        let scene = Scene::on(map);
+        let pairs = Pairs::new(scene.agents);
+        let visible_n = scene.observations.visible(0);
+        group.bench_function(map, |bencher| {
+            bencher.iter(|| {
+                for pair in pairs.iter() {
+                    black_box(common_knowledge(&pair.agents(), black_box(visible_n)));
+                }
+            });
+        });
+    }
+    group.finish();
+}
+
+fn acting(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("one step of the hierarchy, 4 environments");
+    for map in ["3m", "2s3z"] {
+        let mut scene = Scene::on(map);
+        group.bench_function(map, |bencher| bencher.iter(|| scene.act(STEPS)));
+    }
+    group.finish();
+}
+
+fn marginal(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("marginal with gradient");
+    for (agents, actions) in [(3, 9), (5, 11), (8, 14)] {
+        let shape = PolicyShape { agents, actions };
+        let partitions = all_partitions(agents);
+        let even = |choices: usize, rows: usize| vec![-(choices as f32).ln(); choices * rows];
+        let log_p_selector_p = even(partitions.len(), 1);
+        let log_p_pair_kc = even(shape.columns(), shape.pairs());
+        let log_p_agent_na = even(actions, agents);
+        let tables = [&log_p_selector_p[..], &log_p_pair_kc, &log_p_agent_na];
+        let table = PolicyTable::new(shape, &partitions, tables[0], tables[1], tables[2])
+            .expect("the tables fit their shape");
+        let actions_n: Vec<Action> = (0..agents).map(Action::new).collect();
+        let mut gradient = MarginalGradient::new(shape, partitions.len());
+        let name = format!("{agents} agents, {} partitions", partitions.len());
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| {
+                log_likelihood_with_gradient(&table, black_box(&actions_n), &mut gradient)
+            });
+        });
+    }
+    group.finish();
+}
+
+/// A few battles that have been going on for a while, and the untrained team that fights them.
+struct Scene {
+    agents: usize,
+    environments: Vec<Box<dyn Environment>>,
+    observations: Observations,
+    keys: Vec<EpisodeKey>,
+    weights: Weights,
+    actor: Box<dyn Actor>,
+    actions_bn: Vec<Action>,
+    playing: Vec<usize>,
+}
+
+impl Scene {
+    fn on(map: &str) -> Self {
+        let config = ConfigBuilder::new()
+            .set(&format!("env.map={map}"))
+            .and_then(|builder| builder.set("policy.partitions=round-robin"))
+            .and_then(|builder| builder.build())
+            .expect("a map of this program");
+        let world = World::new(&config).expect("a world of this program");
+        let policy = assembly::policy(&config, &world).expect("a policy of this program");
+        let environments = world.environments(ENVIRONMENTS).expect("as above");
+        let agents = world.spec().agents;
+        let episodes = 0..ENVIRONMENTS as u64;
+        let mut scene = Self {
+            agents,
+            environments,
+            observations: Observations::new(world.spec(), ENVIRONMENTS),
+            keys: episodes
+                .map(|episode| EpisodeKey::new(1, Stream::Other, episode))
+                .collect(),
+            weights: policy.weights(&policy.initialise(1)),
+            actor: policy.actor(ENVIRONMENTS),
+            actions_bn: vec![Action::default(); ENVIRONMENTS * agents],
+            playing: (0..ENVIRONMENTS).collect(),
+        };
+        scene.play();
+        scene
+    }
+
+    fn play(&mut self) {
+        self.actor.begin(Recording::Off);
+        for (b, environment) in self.environments.iter_mut().enumerate() {
+            environment.reset(self.keys[b], &mut self.observations.row_mut(b));
+        }
+        for step in 0..STEPS {
+            self.act(step);
+            for (b, environment) in self.environments.iter_mut().enumerate() {
+                let actions = &self.actions_bn[b * self.agents..(b + 1) * self.agents];
+                let time_step = environment
+                    .step(actions, &mut self.observations.row_mut(b))
+                    .expect("actors choose available actions");
+                assert!(time_step.end.is_none(), "a battle takes longer than this");
+            }
+        }
+    }
+
+    fn act(&mut self, step: usize) {
+        let situation = Situation {
+            step,
+            playing: &self.playing,
+            keys: &self.keys,
+            observations: &self.observations,
+            behaviour: Behaviour::sampled(0.1),
+        };
+        self.actor
+            .act(&self.weights, situation, &mut self.actions_bn);
+    }
+}
+
+criterion_group!(benches, common_knowledge_of_all_pairs, acting, marginal);
+criterion_main!(benches);
