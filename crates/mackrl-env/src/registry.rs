@@ -35,10 +35,16 @@ pub enum MakeError {
     MatrixGame(#[from] InvalidProbability),
 }
 
-/// Names of all environments, in the order in which they are listed to users: the skirmishes, then [`MATRIX_GAME`].
+/// Names of SMAC's maps, in the order in which they are listed to users.
+#[must_use]
+pub fn map_names() -> Vec<&'static str> {
+    scenario::map_names()
+}
+
+/// Names of all environments, in the order in which they are listed to users: [`map_names`], then [`MATRIX_GAME`].
 #[must_use]
 pub fn names() -> Vec<&'static str> {
-    let mut names = scenario::map_names();
+    let mut names = map_names();
     names.push(MATRIX_GAME);
     names
 }

@@ -44,7 +44,7 @@ fn every_registered_environment_keeps_the_contract() {
 #[test]
 fn maps_have_the_sizes_of_smac() {
     let names: Vec<&str> = TABLE.iter().map(|(name, _)| *name).collect();
-    assert_eq!(registry::names(), names);
+    assert_eq!(registry::map_names(), names);
     for (name, sizes) in TABLE {
         let environment = registry::make(name, &SkirmishSettings::default())
             .unwrap_or_else(|error| panic!("{name}: {error}"));
