@@ -33,7 +33,7 @@ pub struct Skirmish {
     cooldown_scales: Vec<f32>,
     /// The state in which every episode starts, but for the enemies' orders.
     muster: BattleState,
-    battle: Battle,
+    pub(super) battle: Battle,
     rewards: Rewards,
     last_actions: Vec<Option<Action>>,
     key: EpisodeKey,
@@ -123,7 +123,7 @@ impl Skirmish {
         self.battle.state().hash()
     }
 
-    fn write(&self, out: &mut ObservationMut<'_>) {
+    pub(super) fn write(&self, out: &mut ObservationMut<'_>) {
         let scene = self.scene();
         scene.write(out);
         if self.layout.obs_instead_of_state {

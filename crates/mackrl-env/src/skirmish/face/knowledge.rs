@@ -61,9 +61,9 @@ impl SkirmishKnowledge {
         self.heals[agent]
     }
 
-    /// The unit that action number [`TARGET_ACTIONS_FROM`] + `target` of `agent` is about, if that can be aimed at: an enemy,
-    /// or for a healer a friend that is none. Healers aim at agents by the numbers that others have for enemies, so that
-    /// they cannot aim at more friends than there are enemies.
+    /// The unit that the `target`-th action with a target of `agent` is about, if that can be aimed at: an enemy, or for a
+    /// healer a friend that is none. Healers aim at agents by the numbers that others have for enemies, so that they cannot
+    /// aim at more friends than there are enemies.
     #[must_use]
     pub fn target(&self, agent: usize, target: usize) -> Option<usize> {
         if self.heals[agent] {

@@ -355,3 +355,114 @@ fn sparse_rewards_are_scaled_all_the_same() {
     let reward = rewards.settle(state, Outcome::Lost, &settings);
     assert!((reward + 20.0 / 255.0).abs() < 1e-6, "{reward}");
 }
+
+#[test]
+fn a_medivac_aims_at_friends_by_the_numbers_of_enemies() {
+    // Agents in their order: marauder 0, marine 1, marine 2, medivac 3.
+    let mut play = Play::new(
+        &[
+            ("marine", [10.0, 16.0]),
+            ("marine", [3.0, 16.0]),
+            ("marauder", [10.0, 18.0]),
+            ("medivac", [12.0, 16.0]),
+        ],
+        &[
+            ("marine", [16.0, 16.0]),
+            ("marine", [16.0, 18.0]),
+            ("marine", [16.0, 14.0]),
+            ("marine", [30.0, 16.0]),
+        ],
+    );
+    // The marauder and the nearer marine; not the farther one, not itself; whole friends count too.
+    assert_eq!(play.available(3), [1, 2, 3, 4, 5, 6, 8]);
+    // Rows of enemies have 4 + 1 + 3 entries after the four of moves; each begins with the action of its number.
+    let flags: Vec<f32> = (0..4).map(|e| play.observation(3)[4 + 8 * e]).collect();
+    assert_eq!(flags, [1.0, 0.0, 1.0, 0.0]);
+    // An enemy out of sight has no row, whatever can be healed.
+    assert_eq!(play.observation(3)[4 + 8 * 3..4 + 8 * 4], [0.0; 8]);
+    let medivac = &play.observation(3)[play.observation(3).len() - 4..];
+    assert_eq!(medivac, [1.0, 0.0, 0.0, 1.0], "life and type");
+    // In the state its energy stands where others have their cooldown.
+    let state = play.observations.state(0);
+    assert_eq!(state[3 * 7..3 * 7 + 2], [1.0, 50.0 / 200.0]);
+    play.step(&[1, 1, 1, 8]);
+}
+
+#[test]
+fn a_battle_in_which_only_medivacs_are_left_is_over() {
+    let play = |allies: &[usize], enemies: &[usize]| {
+        let army = |x: f32| {
+            [
+                ("marauder", [x, 12.0]),
+                ("marine", [x, 16.0]),
+                ("medivac", [x, 20.0]),
+                ("medivac", [x, 22.0]),
+            ]
+        };
+        let mut play = Play::new(&army(4.0), &army(28.0));
+        let mut state = play.skirmish.battle().state().clone();
+        for dead in allies.iter().copied().chain(enemies.iter().map(|i| i + 4)) {
+            state.units[dead].life = 0.0;
+        }
+        play.skirmish.battle.restore(&state);
+        let actions: Vec<usize> = (0..4).map(|i| usize::from(!allies.contains(&i))).collect();
+        let actions: Vec<Action> = actions.into_iter().map(Action::new).collect();
+        play.skirmish.write(&mut play.observations.row_mut(0));
+        let step = play
+            .skirmish
+            .step(&actions, &mut play.observations.row_mut(0))
+            .unwrap();
+        (step.end.is_some(), play.skirmish.statistics().battle_won)
+    };
+    assert_eq!(play(&[0], &[0]), (false, false), "fighters on both sides");
+    assert_eq!(play(&[0, 1], &[]), (true, false), "the team's are gone");
+    assert_eq!(play(&[], &[0, 1, 2]), (true, true), "one medivac is left");
+    assert_eq!(
+        play(&[], &[0, 1]),
+        (false, false),
+        "of two medivacs SMAC says nothing"
+    );
+    assert_eq!(
+        play(&[0, 1], &[0, 1, 2]),
+        (true, false),
+        "both: the team's are looked at first"
+    );
+}
+
+#[test]
+fn battles_are_counted() {
+    let mut play = Play::new(&[("marine", [3.0, 16.0])], &[("marine", [30.0, 16.0])]);
+    for _ in 0..7 {
+        play.step(&[1]);
+    }
+    let tally = play.skirmish.tally();
+    assert_eq!(
+        (tally.battles_game, tally.battles_won, tally.timeouts),
+        (1, 0, 1)
+    );
+    assert_eq!(tally.win_rate(), 0.0);
+}
+
+#[test]
+fn the_ground_around_an_agent_is_shown_at_twice_a_move() {
+    let settings = SkirmishSettings {
+        obs_pathing_grid: true,
+        obs_terrain_height: true,
+        ..SkirmishSettings::default()
+    };
+    // On the lane (y 8 to 24), at x 1: north, south, east, west at 4, then north-east, south-west, south-east, north-west at 2.
+    let play = Play::with(
+        &[("marine", [1.5, 9.5])],
+        &[("marine", [8.0, 16.0])],
+        settings,
+    );
+    assert_eq!(
+        play.observation(0)[4..12],
+        [1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0],
+        "what lies outside the map counts as open"
+    );
+    assert_eq!(
+        play.observation(0)[12..21],
+        [0.5, 0.0, 0.5, 1.0, 0.5, 1.0, 0.0, 1.0, 0.5]
+    );
+}
