@@ -86,7 +86,7 @@ pub fn policy(config: &Config, world: &World) -> Result<Box<dyn Decentralised>, 
 }
 
 /// How the learner learns.
-pub(super) fn learner(config: &Config) -> LearnerSettings {
+pub(crate) fn learner(config: &Config) -> LearnerSettings {
     let settings = &config.learner;
     let optimiser = match settings.optimiser {
         config::OptimiserKind::Adam => OptimiserKind::ADAM,
