@@ -1,7 +1,8 @@
-//! Every registered environment keeps the contract, and skirmishes have the sizes of SMAC's maps.
+//! Every registered environment, the matrix game included, keeps the contract, and skirmishes have the sizes of SMAC's maps.
 
 use mackrl_env::{
     contract::check_environment,
+    matrix_game::{InvalidProbability, MatrixGameSettings},
     registry::{self, MakeError},
     skirmish::SkirmishSettings,
 };
@@ -39,6 +40,24 @@ fn every_registered_environment_keeps_the_contract() {
         let mut environment = registry::make(name, &SkirmishSettings::default()).unwrap();
         check_environment(environment.as_mut(), 2);
     }
+}
+
+#[test]
+fn the_matrix_game_is_registered_with_its_default_settings() {
+    assert_eq!(registry::names().last(), Some(&registry::MATRIX_GAME));
+    let game = registry::make(registry::MATRIX_GAME, &SkirmishSettings::default()).unwrap();
+    assert_eq!(
+        (game.spec().name.as_str(), game.spec().agents),
+        (registry::MATRIX_GAME, 2)
+    );
+    let settings = MatrixGameSettings {
+        common_knowledge: 1.5,
+        ..MatrixGameSettings::default()
+    };
+    assert_eq!(
+        registry::make_matrix_game(settings).err(),
+        Some(MakeError::MatrixGame(InvalidProbability(1.5)))
+    );
 }
 
 #[test]

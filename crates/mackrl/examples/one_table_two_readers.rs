@@ -45,10 +45,10 @@ fn main() -> Result<(), Error> {
 
     println!("joint action   p(u) over all paths   sampled   difference in standard errors");
     let mut total = 0.0;
-    for joint in 0..1 << AGENTS {
+    for (joint, count) in counts.into_iter().enumerate() {
         let action_n: Vec<Action> = (0..AGENTS).map(|n| Action::new(joint >> n & 1)).collect();
         let p = log_likelihood(&table, &action_n).exp();
-        let sampled = f64::from(counts[joint]) / EPISODES as f64;
+        let sampled = f64::from(count) / EPISODES as f64;
         let error = (p * (1.0 - p) / EPISODES as f64).sqrt();
         let names: Vec<String> = action_n.iter().map(ToString::to_string).collect();
         let difference = (sampled - p) / error;

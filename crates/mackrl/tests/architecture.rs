@@ -129,6 +129,27 @@ fn modules_import_only_what_the_table_allows() {
 }
 
 #[test]
+fn the_table_of_modules_allows_nothing_that_is_not_used() {
+    let source = root().join("crates/mackrl/src");
+    for (name, rule) in module_rules() {
+        let files = sources(&source.join(&name)).into_iter();
+        let paths: Vec<_> = files.flat_map(|file| imported_paths(&file)).collect();
+        let used: BTreeSet<String> = (paths.iter())
+            .filter(|path| path[0] == "crate" && path.len() > 1)
+            .map(|path| path[1].clone())
+            .filter(|item| *item != name && !is_shared(item))
+            .collect();
+        assert_eq!(used, rule.imports, "imports of {name} (left) and the table");
+        let seen = (paths.iter())
+            .filter(|path| path[0] == "mackrl_env")
+            .map(|path| path.get(1).map_or(Sight::Worlds, |item| needed_sight(item)))
+            .max();
+        let seen = seen.unwrap_or(Sight::Nothing);
+        assert_eq!(seen, rule.sees, "what {name} sees (left) and the table");
+    }
+}
+
+#[test]
 fn plots_never_see_the_trainer() {
     let plot = root().join("crates/mackrl-cli/src/plot");
     let files = if plot.exists() {
@@ -181,11 +202,7 @@ fn allows(rule: &Rule, name: &str, path: &[String]) -> bool {
         return path[0] != "mackrl_env" || rule.sees == Sight::Worlds;
     };
     match path[0].as_str() {
-        // At the root of the crate are its errors, its numbers, its threads and its stopwatch, which everybody may use.
-        "crate" => {
-            let is_shared = starts_upper(item) || item == "parallel";
-            item == name || rule.imports.contains(item) || is_shared
-        }
+        "crate" => item == name || rule.imports.contains(item) || is_shared(item),
         "mackrl_env" => rule.sees >= needed_sight(item),
         _ => true,
     }
@@ -201,8 +218,9 @@ fn needed_sight(item: &str) -> Sight {
     }
 }
 
-fn starts_upper(item: &str) -> bool {
-    item.starts_with(char::is_uppercase)
+/// Whether everybody may use it: the errors, the numbers and the threads at the root of the crate.
+fn is_shared(item: &str) -> bool {
+    item.starts_with(char::is_uppercase) || item == "parallel"
 }
 
 /// Crate → crates that it may import.

@@ -23,7 +23,11 @@ impl From<&EnvironmentSpec> for MapRow {
         Self {
             name: spec.name.clone(),
             n_agents: spec.agents,
-            n_enemies: spec.entities - spec.agents,
+            n_enemies: if spec.name == registry::MATRIX_GAME {
+                0 // Its third entity is the matrix.
+            } else {
+                spec.entities - spec.agents
+            },
             n_actions: spec.actions,
             obs_size: spec.observation_size,
             state_size: spec.state_size,

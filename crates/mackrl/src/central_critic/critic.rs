@@ -268,3 +268,101 @@ pub(crate) fn not_finite(
         update,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use mackrl_env::{EpisodeEnd, Stream};
+
+    use super::*;
+
+    const STATE_SIZE: usize = 2;
+
+    fn critic(learning_rate: f64, target_interval_updates: u64, bootstrap: bool) -> CentralCritic {
+        let settings = CriticSettings {
+            hidden: 5,
+            optimiser: OptimiserKind::ADAM,
+            learning_rate,
+            gradient_norm_max: 10.0,
+            returns: ReturnSettings {
+                gamma: 0.9,
+                lambda: 0.5,
+            },
+            target_interval_updates,
+            bootstrap_at_time_limit: bootstrap,
+        };
+        CentralCritic::new(STATE_SIZE, settings, &EpisodeKey::new(1, Stream::Other, 1))
+    }
+
+    fn two_steps(end: EpisodeEnd) -> Episode {
+        Episode {
+            state_tg: vec![0.5, -1.0, 2.0, 0.3, -0.7, 1.1],
+            reward_t: vec![3.0, 7.0],
+            end: Some(end),
+            ..Episode::default()
+        }
+    }
+
+    /// V of the three states of an episode.
+    fn values(critic: &mut CentralCritic, episode: &Episode) -> [f32; 3] {
+        critic.trace.begin(3).copy_from_slice(&episode.state_tg);
+        critic.network.forward(&critic.weights, &mut critic.trace);
+        let values = critic.trace.outputs();
+        [values[0], values[1], values[2]]
+    }
+
+    /// With a step size that changes nothing, V is the same throughout a sweep.
+    #[test]
+    fn advantages_of_two_steps_are_those_worked_by_hand() {
+        let cases = [
+            (EpisodeEnd::Terminated, true, 0.0),
+            (EpisodeEnd::Truncated, false, 0.0),
+            (EpisodeEnd::Truncated, true, 0.9),
+        ];
+        for (end, bootstrap, discount_at_end) in cases {
+            let mut critic = critic(1e-30, 200, bootstrap);
+            let episode = two_steps(end);
+            let [first, second, last] = values(&mut critic, &episode);
+            let mut advantage_bt = Vec::new();
+            let report = critic.sweep(&[&episode], &mut advantage_bt).unwrap();
+            let expected = [
+                3.0 + 0.9 * second - first,
+                7.0 + discount_at_end * last - second,
+            ];
+            for (found, expected) in advantage_bt[0].iter().zip(expected) {
+                assert!((found - expected).abs() < 1e-5, "{end:?}: {advantage_bt:?}");
+            }
+            let return_1 = 7.0 + discount_at_end * last;
+            let return_0 = 3.0 + 0.9 * (0.5 * second + 0.5 * return_1);
+            let target_mean = f64::from((return_0 + return_1) / 2.0);
+            assert!(
+                (report.target_mean - target_mean).abs() < 1e-5,
+                "{report:?}"
+            );
+        }
+    }
+
+    /// An episode of two steps makes two updates, so an interval of three has passed before the third sweep, not the second.
+    #[test]
+    fn targets_change_when_the_interval_has_passed() {
+        let mut critic = critic(0.01, 3, false);
+        let episode = two_steps(EpisodeEnd::Terminated);
+        let mut targets = || {
+            let report = critic.sweep(&[&episode], &mut Vec::new()).unwrap();
+            report.target_mean
+        };
+        let [first, second, third] = [targets(), targets(), targets()];
+        assert_eq!(first, second);
+        assert_ne!(second, third);
+    }
+
+    #[test]
+    fn a_reward_that_is_no_number_is_refused_with_the_name_of_a_tensor() {
+        let mut critic = critic(0.01, 3, false);
+        let mut episode = two_steps(EpisodeEnd::Terminated);
+        episode.reward_t[1] = f32::NAN;
+        let before = critic.parameters.clone();
+        let error = critic.sweep(&[&episode], &mut Vec::new()).unwrap_err();
+        assert!(error.to_string().contains("gradient of critic."), "{error}");
+        assert_eq!(critic.parameters, before);
+    }
+}

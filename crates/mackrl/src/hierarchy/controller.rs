@@ -294,3 +294,107 @@ fn grow<T: Clone + Default>(buffer: &mut Vec<T>, len: usize) {
         buffer.resize(len, T::default());
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use mackrl_env::Stream;
+
+    use super::*;
+
+    const SIZES: NetworkSizes = NetworkSizes {
+        inputs: 3,
+        hidden: 5,
+        outputs: 2,
+    };
+
+    struct Subject {
+        controller: Controller,
+        weights: RecurrentWeights<f32>,
+        parameters: usize,
+    }
+
+    impl Subject {
+        fn new() -> Self {
+            let mut layout = ParameterLayout::new();
+            let controller = Controller::new(&mut layout, "controller", SIZES);
+            let mut parameters = vec![0.0; layout.len()];
+            controller.initialise(&EpisodeKey::new(1, Stream::Other, 0), &mut parameters);
+            Self {
+                weights: controller.weights(&parameters),
+                parameters: parameters.len(),
+                controller,
+            }
+        }
+
+        /// Plays steps with the given instances, whose inputs depend on instance and step; gives the log-probabilities of
+        /// `watched` at each step.
+        fn play(&self, steps: &[&[usize]], watched: usize) -> (ControllerMemory, Vec<Vec<f32>>) {
+            let mut memory = ControllerMemory::new(&self.controller);
+            memory.begin(Recording::ForLearning);
+            let mut log_p = Vec::new();
+            for (step, instances) in steps.iter().enumerate() {
+                memory.begin_step(instances.iter().copied());
+                for (row, &instance) in instances.iter().enumerate() {
+                    let (input, mask) = memory.row_mut(row);
+                    input[instance % SIZES.inputs] = 1.0 + step as f32;
+                    mask.fill(true);
+                }
+                memory.run(&self.controller, &self.weights, 0.1);
+                if let Some(row) = memory.row_of(watched) {
+                    log_p.push(memory.log_p(row).to_vec());
+                }
+            }
+            (memory, log_p)
+        }
+
+        /// The gradient after each of `choices`, (row, column, posterior), was noted at the latest step.
+        fn gradient(&self, choices: &[(usize, usize, f32)]) -> Vec<f32> {
+            let (mut memory, _) = self.play(&[&[0, 1], &[0, 1]], 0);
+            for &(row, column, posterior) in choices {
+                memory.record(row, column, 0, posterior);
+            }
+            let mut gradient = vec![0.0; self.parameters];
+            memory.backward(
+                &self.controller,
+                &self.weights,
+                &[vec![9.0, 0.5]],
+                &mut gradient,
+            );
+            gradient
+        }
+    }
+
+    #[test]
+    fn a_row_that_stays_keeps_its_recurrence_when_others_leave() {
+        let subject = Subject::new();
+        let (_, among_others) = subject.play(&[&[0, 1, 4], &[1, 4], &[4]], 4);
+        let (_, alone) = subject.play(&[&[4], &[4], &[4]], 4);
+        assert_eq!(among_others, alone);
+        assert_ne!(alone[1], alone[2], "inputs change nothing");
+        let (_, gone) = subject.play(&[&[0, 1, 4], &[1, 4], &[4]], 1);
+        assert_eq!(gone.len(), 2, "an instance that left has no row");
+    }
+
+    #[test]
+    #[should_panic(expected = "no controller joins after the first step")]
+    fn a_controller_that_joins_late_is_refused() {
+        Subject::new().play(&[&[0], &[0, 1]], 0);
+    }
+
+    #[test]
+    fn a_choice_weighs_what_its_posteriors_sum_to() {
+        let subject = Subject::new();
+        let whole = subject.gradient(&[(1, 0, 1.0), (0, 1, 0.5)]);
+        let parts = subject.gradient(&[(0, 1, 0.5), (1, 0, 0.25), (1, 0, 0.75)]);
+        assert!(whole.iter().any(|&g| g != 0.0), "no gradient at all");
+        for (whole, parts) in whole.iter().zip(parts) {
+            assert!((whole - parts).abs() < 1e-6, "{whole} {parts}");
+        }
+        let other = subject.gradient(&[(1, 1, 1.0), (0, 1, 0.5)]);
+        assert_ne!(whole, other, "the column makes no difference");
+        assert_eq!(
+            subject.gradient(&[(1, 0, 0.0)]),
+            vec![0.0; subject.parameters]
+        );
+    }
+}

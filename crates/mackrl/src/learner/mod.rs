@@ -210,3 +210,65 @@ impl Learner {
         objective
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use mackrl_env::Action;
+
+    use super::*;
+    use crate::{
+        config::Config,
+        policy::{Actor, Behaviour, ControllerInput, Recording, Situation, Tally},
+        rollout::{Rollout, RolloutSettings},
+        training::assembly::{self, World},
+    };
+
+    /// An actor whose gradient is broken in one place.
+    struct Broken(usize);
+
+    impl Actor for Broken {
+        fn begin(&mut self, _: Recording) {}
+        fn act(&mut self, _: &Weights, _: Situation<'_>, _: &mut [Action]) {}
+        fn backward(&mut self, _: &Weights, _: &[Vec<f32>], gradient: &mut [f32]) -> f64 {
+            gradient[self.0] = f32::NAN;
+            0.0
+        }
+        fn report(&self, _: &mut Tally) {}
+        fn controller_inputs(&self, _: usize) -> Vec<ControllerInput> {
+            Vec::new()
+        }
+    }
+
+    #[test]
+    fn a_gradient_that_is_no_number_is_refused_and_the_policy_stays_as_it_was() {
+        let mut config = Config::default();
+        config.env.map = "matrix-game".to_owned();
+        config.policy.hidden = 5;
+        let world = World::new(&config).unwrap();
+        let policy = assembly::policy(&config, &world).unwrap();
+        let sizes = [world.spec().agents, world.spec().state_size];
+        let mut learner = Learner::new(&*policy, sizes, assembly::learner(&config), 1, 1);
+        let mut rollout = Rollout::new(&*policy, world.environments(3).unwrap(), 3, 1);
+        let keys = [0, 1, 2].map(|episode| EpisodeKey::new(1, Stream::Training, episode));
+        let settings = RolloutSettings {
+            behaviour: Behaviour::sampled(0.5),
+            recording: Recording::ForLearning,
+        };
+        rollout.play(learner.weights(), &keys, settings).unwrap();
+        let mut broken = ShardBatch {
+            episodes: rollout.batches().next().unwrap().episodes.clone(),
+            actor: Box::new(Broken(policy.layout().len() - 1)),
+        };
+        let before = learner.parameters().to_vec();
+        let error = learner.update(&*policy, vec![&mut broken]).unwrap_err();
+        let name = &policy.layout().tensors().last().unwrap().name;
+        assert!(error.to_string().contains(name), "{error}");
+        assert_eq!(learner.parameters(), before);
+        assert_eq!(learner.updates(), 0);
+        learner
+            .update(&*policy, rollout.batches().collect())
+            .unwrap();
+        assert_ne!(learner.parameters(), before);
+        assert_eq!(learner.updates(), 1);
+    }
+}

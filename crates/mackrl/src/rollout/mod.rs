@@ -115,3 +115,51 @@ impl Rollout {
         tally
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use mackrl_env::Stream;
+
+    use super::*;
+    use crate::{
+        config::Config,
+        training::assembly::{self, World},
+    };
+
+    /// Plays some episodes of the matrix game in 5 environments, 2 to a shard; gives the number of episodes of each shard.
+    fn play(episodes: u64) -> Vec<usize> {
+        let mut config = Config::default();
+        config.env.map = "matrix-game".to_owned();
+        config.policy.hidden = 3;
+        let world = World::new(&config).unwrap();
+        let policy = assembly::policy(&config, &world).unwrap();
+        let weights = policy.weights(&policy.initialise(1));
+        let mut rollout = Rollout::new(&*policy, world.environments(5).unwrap(), 2, 1);
+        assert_eq!(rollout.environments(), 5);
+        let settings = RolloutSettings {
+            behaviour: Behaviour::GREEDY,
+            recording: Recording::Off,
+        };
+        for count in [5, episodes] {
+            let keys: Vec<EpisodeKey> = (0..count)
+                .map(|episode| EpisodeKey::new(1, Stream::Other, episode))
+                .collect();
+            rollout.play(&weights, &keys, settings).unwrap();
+        }
+        let batches = rollout.batches();
+        batches.map(|batch| batch.episodes.len()).collect()
+    }
+
+    #[test]
+    fn environments_without_a_key_leave_no_episode_of_an_earlier_rollout() {
+        assert_eq!(play(5), [2, 2, 1]);
+        assert_eq!(play(3), [2, 1, 0]);
+        assert_eq!(play(0), [0, 0, 0]);
+    }
+
+    #[test]
+    #[should_panic(expected = "one environment per episode")]
+    fn more_episodes_than_environments_are_refused() {
+        play(6);
+    }
+}

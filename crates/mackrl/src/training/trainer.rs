@@ -257,3 +257,20 @@ impl std::fmt::Debug for Trainer {
             .finish_non_exhaustive()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exploration_falls_linearly_and_then_stays() {
+        let mut config = Config::default();
+        config.policy.hidden = 2;
+        let mut trainer = Trainer::new(&config, 1).unwrap();
+        for (steps, expected) in [(0, 0.5), (12_500, 0.3775), (50_000, 0.01), (70_000, 0.01)] {
+            trainer.steps_env = steps;
+            let found = trainer.exploration();
+            assert!((found - expected).abs() < 1e-12, "{steps}: {found}");
+        }
+    }
+}
