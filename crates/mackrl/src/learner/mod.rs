@@ -10,8 +10,8 @@ use mackrl_env::{EpisodeKey, Stream};
 
 use crate::{
     Error,
-    central_critic::{CentralCritic, CriticReport, CriticSettings, not_finite},
-    nn::{Optimiser, OptimiserKind, clip_gradient_norm, first_not_finite},
+    central_critic::{CentralCritic, CriticReport, CriticSettings, CriticState, not_finite},
+    nn::{Moments, Optimiser, OptimiserKind, clip_gradient_norm, first_not_finite},
     parallel::for_each_in_parallel,
     policy::{Policy, Weights},
     rollout::{Episode, ShardBatch},
@@ -41,6 +41,19 @@ pub struct UpdateReport {
     pub advantage_mean: f64,
     /// What the critic's sweep did.
     pub critic: CriticReport,
+}
+
+/// All that a learner has learnt: with its settings, everything that its future depends on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LearnerState {
+    /// The policy's parameters.
+    pub parameters: Vec<f32>,
+    /// What the policy's optimiser remembers.
+    pub moments: Moments<f32>,
+    /// Policy updates so far.
+    pub updates: u64,
+    /// The critic.
+    pub critic: CriticState,
 }
 
 /// The policy's parameters, the critic, and how both change.
@@ -115,6 +128,29 @@ impl Learner {
     #[must_use]
     pub const fn updates(&self) -> u64 {
         self.updates
+    }
+
+    /// What a checkpoint must hold.
+    #[must_use]
+    pub fn state(&self) -> LearnerState {
+        LearnerState {
+            parameters: self.parameters.clone(),
+            moments: self.optimiser.moments().clone(),
+            updates: self.updates,
+            critic: self.critic.state(),
+        }
+    }
+
+    /// Continues from a checkpoint.
+    ///
+    /// # Panics
+    /// If the state is that of another policy, critic or optimiser.
+    pub fn restore(&mut self, policy: &dyn Policy, state: LearnerState) {
+        policy.refresh(&state.parameters, &mut self.weights);
+        self.optimiser.restore(state.moments);
+        self.critic.restore(state.critic);
+        self.parameters = state.parameters;
+        self.updates = state.updates;
     }
 
     /// Learns from the batch that `shards` hold.
