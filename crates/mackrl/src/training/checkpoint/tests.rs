@@ -33,7 +33,7 @@ fn train(config: &Config, threads: &[usize], pause: u64) -> (Vec<String>, Checkp
     let mut turns = threads.iter().cycle().skip(1);
     while !trainer.finished() {
         rows.extend(trainer.update().unwrap().as_ref().map(bytes));
-        if trainer.iterations() % pause == 0 {
+        if trainer.iterations().is_multiple_of(pause) {
             let checkpoint = trainer.checkpoint();
             trainer = Trainer::new(config, *turns.next().unwrap()).unwrap();
             trainer.restore(&checkpoint).unwrap();
