@@ -159,13 +159,15 @@ impl Learner {
     /// `∇J = 1 / (N Σ_b T_b) Σ_{b,t} A_{bt} ∇ log p(u_{bt})` (eq. 6), then one step of the optimiser.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] if a gradient is not finite. The policy has not changed then.
+    /// [`Error::NotFinite`] if a reward or a state is not finite, before anything changes; or if a gradient is not finite: the
+    /// policy has not changed then.
     pub fn update(
         &mut self,
         policy: &dyn Policy,
         shards: Vec<&mut ShardBatch>,
     ) -> Result<UpdateReport, Error> {
         let episodes: Vec<&Episode> = shards.iter().flat_map(|shard| &shard.episodes).collect();
+        self.check_finite(&episodes)?;
         let steps: usize = episodes.iter().map(|episode| episode.steps()).sum();
         let critic = self.critic.sweep(&episodes, &mut self.advantage_bt)?;
         let advantages = self.advantage_bt.iter().flatten();
@@ -193,6 +195,25 @@ impl Learner {
             advantage_mean,
             critic,
         })
+    }
+
+    /// Refuses episodes that hold a number that is not finite.
+    fn check_finite(&self, episodes: &[&Episode]) -> Result<(), Error> {
+        for (b, episode) in episodes.iter().enumerate() {
+            for (what, numbers) in [("reward", &episode.reward_t), ("state", &episode.state_tg)] {
+                if let Some(index) = first_not_finite(numbers) {
+                    // T rewards, but T + 1 states.
+                    let times = episode.steps() + usize::from(what == "state");
+                    let t = index * times / numbers.len();
+                    return Err(Error::NotFinite {
+                        tensor: format!("{what} at step {t} of episode {b} of the batch"),
+                        value: f64::from(numbers[index]),
+                        update: self.updates,
+                    });
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Computes the gradient of −J into the first shard's gradient and returns J.
@@ -240,5 +261,84 @@ impl Learner {
             }
         }
         objective
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        baselines::CentralV,
+        central_critic::ReturnSettings,
+        config::Config,
+        policy::{Behaviour, Recording},
+        rollout::{Rollout, RolloutSettings},
+    };
+
+    /// A learner of the built-in map and a batch of two episodes.
+    fn prepare() -> (CentralV, Learner, Rollout) {
+        let environments = || Config::default().env.make().unwrap();
+        let spec = environments().spec().clone();
+        let policy = CentralV::new(&spec, 5);
+        let settings = LearnerSettings {
+            optimiser: OptimiserKind::ADAM,
+            learning_rate: 1e-3,
+            gradient_norm_max: 10.0,
+            critic: CriticSettings {
+                hidden: 5,
+                optimiser: OptimiserKind::ADAM,
+                learning_rate: 1e-3,
+                gradient_norm_max: 10.0,
+                returns: ReturnSettings {
+                    gamma: 0.99,
+                    lambda: 0.8,
+                },
+                target_interval_updates: 200,
+                bootstrap_at_time_limit: false,
+            },
+        };
+        let learner = Learner::new(&policy, [spec.agents, spec.state_size], settings, 1, 1);
+        let mut rollout = Rollout::new(&policy, vec![environments(), environments()], 2, 1);
+        let keys = [0, 1].map(|episode| EpisodeKey::new(1, Stream::Training, episode));
+        let settings = RolloutSettings {
+            behaviour: Behaviour::sampled(0.5),
+            recording: Recording::ForLearning,
+        };
+        rollout.play(learner.weights(), &keys, settings).unwrap();
+        (policy, learner, rollout)
+    }
+
+    #[test]
+    fn a_number_that_is_not_finite_is_named_before_anything_changes() {
+        let (policy, mut learner, mut rollout) = prepare();
+        let before = learner.state();
+        let plant = |rollout: &mut Rollout, reward: f32, state: f32| {
+            let batch = rollout.batches().next().unwrap();
+            batch.episodes[1].reward_t[3] = reward;
+            let size = batch.episodes[1].state(0).len();
+            batch.episodes[1].state_tg[7 * size + size - 1] = state;
+        };
+        for (reward, state, expected) in [
+            (
+                f32::NAN,
+                0.0,
+                "reward at step 3 of episode 1 of the batch holds NaN at update 0",
+            ),
+            (
+                0.0,
+                f32::INFINITY,
+                "state at step 7 of episode 1 of the batch holds inf at update 0",
+            ),
+        ] {
+            plant(&mut rollout, reward, state);
+            let batches = rollout.batches().collect();
+            let error = learner.update(&policy, batches).unwrap_err();
+            assert_eq!(error.to_string(), expected);
+            assert!(learner.state() == before, "nothing has changed");
+        }
+        plant(&mut rollout, 0.0, 0.0);
+        let batches = rollout.batches().collect();
+        learner.update(&policy, batches).unwrap();
+        assert!(learner.state() != before, "a sound batch is learnt from");
     }
 }
