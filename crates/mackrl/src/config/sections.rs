@@ -94,7 +94,7 @@ section! {
         /// Environment steps between two rows of training metrics; tests give rows of their own.
         metrics_interval_steps_env: u64 = 2_000, "an integer in [1, 2^53]", |steps| (1..=EXACT).contains(steps);
         /// Environment steps between two checkpoints; one more is written at the end. Changes no result.
-        checkpoint_interval_steps_env: u64 = 100_000, "an integer in [1, 2^53]", |steps| (1..=EXACT).contains(steps);
+        checkpoint_interval_steps_env: u64 = 200_000, "an integer in [1, 2^53]", |steps| (1..=EXACT).contains(steps);
         /// Checkpoints that stay in the run folder; older ones are removed. Changes no result.
         checkpoints_kept: usize = 2, "an integer in [1, 1000]", |kept| (1..=1000).contains(kept);
         /// Seed from which every random draw of the run is derived; known to all agents.
