@@ -18,6 +18,12 @@ pub(crate) enum Failure {
         /// What lies there, for "holds ...".
         holds: String,
     },
+    /// A folder in which a run can go on.
+    UnfinishedRun { folder: PathBuf },
+    /// A folder in which another process writes.
+    FolderLocked { folder: PathBuf },
+    /// A run that was asked to stop, and can go on.
+    Interrupted { folder: PathBuf, steps_env: u64 },
     /// A folder in which no run lies.
     NotARun { folder: PathBuf },
     /// Stored data that cannot be used.
@@ -32,6 +38,21 @@ impl fmt::Display for Failure {
             Self::FolderInUse { folder, holds } => write!(
                 formatter,
                 "{} already holds {holds}, and is not overwritten",
+                folder.display()
+            ),
+            Self::UnfinishedRun { folder } => write!(
+                formatter,
+                "{} already holds an unfinished run, and is not overwritten",
+                folder.display()
+            ),
+            Self::FolderLocked { folder } => write!(
+                formatter,
+                "another process is writing in {}",
+                folder.display()
+            ),
+            Self::Interrupted { folder, steps_env } => write!(
+                formatter,
+                "{} was interrupted at {steps_env} environment steps",
                 folder.display()
             ),
             Self::NotARun { folder } => write!(
@@ -50,6 +71,13 @@ impl fmt::Display for Failure {
 
 impl std::error::Error for Failure {}
 
+impl Failure {
+    /// Whether a run ended because it was asked to.
+    pub(crate) fn is_interruption(error: &anyhow::Error) -> bool {
+        matches!(error.downcast_ref(), Some(Self::Interrupted { .. }))
+    }
+}
+
 /// Why the program ends, by the number that the shell sees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Exit {
@@ -59,6 +87,7 @@ enum Exit {
     Data = 65,
     Defect = 70,
     InputOutput = 74,
+    Interrupted = 75,
 }
 
 /// Tells what went wrong, if something did, and gives the exit code.
@@ -90,7 +119,11 @@ fn exit(error: &anyhow::Error) -> Exit {
 fn exit_of(cause: &(dyn std::error::Error + 'static)) -> Option<Exit> {
     if let Some(failure) = cause.downcast_ref::<Failure>() {
         return Some(match failure {
-            Failure::FolderInUse { .. } | Failure::NotARun { .. } => Exit::Usage,
+            Failure::FolderInUse { .. }
+            | Failure::UnfinishedRun { .. }
+            | Failure::FolderLocked { .. }
+            | Failure::NotARun { .. } => Exit::Usage,
+            Failure::Interrupted { .. } => Exit::Interrupted,
             Failure::BadData { .. } => Exit::Data,
             Failure::CertificateFailed { .. } => Exit::CertificateFailed,
         });
@@ -117,6 +150,13 @@ fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
         return match failure {
             Failure::FolderInUse { .. } => {
                 Some("choose another folder with --out, or move this one away".to_owned())
+            }
+            Failure::UnfinishedRun { folder } => Some(format!(
+                "go on with `mackrl resume {}`, or choose another folder with --out",
+                folder.display()
+            )),
+            Failure::Interrupted { folder, .. } => {
+                Some(format!("go on with `mackrl resume {}`", folder.display()))
             }
             Failure::NotARun { .. } => Some(
                 "give the folder that `mackrl train` wrote, such as runs/3m-mackrl-seed1"
@@ -163,11 +203,19 @@ mod tests {
         let config = ConfigBuilder::new().set("a=1").unwrap_err();
         let missing = io::Error::from(io::ErrorKind::NotFound);
         let folder = PathBuf::from("x");
-        let cases: [(anyhow::Error, Exit); 7] = [
+        let cases: [(anyhow::Error, Exit); 8] = [
             (config.clone().into(), Exit::Configuration),
             (mackrl::Error::from(config).into(), Exit::Configuration),
             (mackrl::Error::Data(String::new()).into(), Exit::Data),
             (missing.into(), Exit::InputOutput),
+            (
+                Failure::Interrupted {
+                    folder: folder.clone(),
+                    steps_env: 1,
+                }
+                .into(),
+                Exit::Interrupted,
+            ),
             (Failure::NotARun { folder }.into(), Exit::Usage),
             (
                 Failure::CertificateFailed { mismatches: 1 }.into(),

@@ -1,8 +1,8 @@
 //! The `mackrl` program: train, evaluate, certify and reproduce.
 //!
 //! This crate holds no algorithm. `args` is what was typed, `commands` what it means, `reproduce` one command for each figure
-//! of the paper, `plot` the drawing of its results, `run_folder` what a run leaves on disk, `progress` what a person sees
-//! while waiting, `failure` the one place that turns errors into exit codes. Data go to stdout, everything else to stderr.
+//! of the paper, `plot` the drawing of its results, `training_loop` the loop around a trainer, `run_folder` what a run leaves on disk,
+//! `progress` what a person sees while waiting, `signals` how a person stops waiting, `failure` the one place that turns errors into exit codes. Data go to stdout, everything else to stderr.
 
 mod args;
 mod commands;
@@ -12,6 +12,8 @@ mod plot;
 mod progress;
 mod reproduce;
 mod run_folder;
+mod signals;
+mod training_loop;
 
 use std::process::ExitCode;
 
@@ -22,6 +24,7 @@ use crate::args::{Cli, Command};
 fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Train(args) => commands::train::run(&args),
+        Command::Resume(args) => commands::resume::run(&args),
         Command::Evaluate(args) => commands::evaluate::run(&args),
         Command::Certify(args) => commands::certify::run(&args),
         Command::ExecuteAgent(args) => commands::execute_agent::run(&args),

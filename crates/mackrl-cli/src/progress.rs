@@ -26,6 +26,8 @@ pub(crate) struct Standing {
 pub(crate) struct Progress {
     style: Style,
     start: Instant,
+    /// Environment steps played when the clock started.
+    steps_env_at_start: u64,
     shown: Option<Instant>,
     latest: Option<Standing>,
 }
@@ -34,29 +36,19 @@ pub(crate) struct Progress {
 enum Style {
     Terminal,
     Plain,
-    #[cfg(test)]
-    Silent,
 }
 
 impl Progress {
-    /// Starts the clock; the style is what stderr can show.
-    pub(crate) fn new() -> Self {
-        Self::with_style(if io::stderr().is_terminal() {
+    /// Starts the clock of a run that has played `steps_env` environment steps; the style is what stderr can show.
+    pub(crate) fn new(steps_env: u64) -> Self {
+        let style = if io::stderr().is_terminal() {
             Style::Terminal
         } else {
             Style::Plain
-        })
-    }
-
-    /// Shows nothing.
-    #[cfg(test)]
-    pub(crate) fn silent() -> Self {
-        Self::with_style(Style::Silent)
-    }
-
-    fn with_style(style: Style) -> Self {
+        };
         Self {
             style,
+            steps_env_at_start: steps_env,
             start: Instant::now(),
             shown: None,
             latest: None,
@@ -84,13 +76,11 @@ impl Progress {
     }
 
     fn write(&self, standing: &Standing) {
-        let line = line(standing, self.start.elapsed());
+        let line = line(standing, self.steps_env_at_start, self.start.elapsed());
         match self.style {
             // Back to the start of the line, and clear what is left of the previous one.
             Style::Terminal => write_stderr(&format!("\r{line}\x1b[K")),
             Style::Plain => write_stderr(&format!("{line}\n")),
-            #[cfg(test)]
-            Style::Silent => {}
         }
     }
 }
@@ -99,8 +89,6 @@ fn is_due(style: Style, shown: Instant, now: Instant) -> bool {
     let interval = match style {
         Style::Terminal => TERMINAL_INTERVAL,
         Style::Plain => PLAIN_INTERVAL,
-        #[cfg(test)]
-        Style::Silent => return false,
     };
     now.duration_since(shown) >= interval
 }
@@ -114,15 +102,15 @@ fn write_stderr(text: &str) {
 }
 
 /// Steps, rate, time left, win rate and delegation rate, in fewer than 80 columns.
-fn line(standing: &Standing, elapsed: Duration) -> String {
+fn line(standing: &Standing, steps_env_at_start: u64, elapsed: Duration) -> String {
     let Standing {
         steps_env,
         steps_env_total,
         ..
     } = *standing;
-    let rate = steps_env as f64 / elapsed.as_secs_f64().max(1e-3);
+    let rate = (steps_env - steps_env_at_start) as f64 / elapsed.as_secs_f64().max(1e-3);
     let mut line = format!("{steps_env}/{steps_env_total} steps, {rate:.0}/s");
-    if steps_env > 0 && steps_env < steps_env_total {
+    if rate > 0.0 && steps_env < steps_env_total {
         let left_s = (steps_env_total - steps_env) as f64 / rate;
         line.push_str(&format!(", {} left", clock(left_s)));
     }
@@ -161,8 +149,21 @@ mod tests {
             delegation_rate: Some(0.34),
         };
         assert_eq!(
-            line(&standing, Duration::from_secs(10)),
+            line(&standing, 0, Duration::from_secs(10)),
             "250000/1000000 steps, 25000/s, 0:30 left, won 88 %, delegated 34 %"
+        );
+    }
+
+    #[test]
+    fn a_resumed_run_is_timed_from_where_it_went_on() {
+        let standing = Standing {
+            steps_env: 900_000,
+            steps_env_total: 1_000_000,
+            ..Standing::default()
+        };
+        assert_eq!(
+            line(&standing, 800_000, Duration::from_secs(10)),
+            "900000/1000000 steps, 10000/s, 0:10 left"
         );
     }
 
@@ -174,7 +175,7 @@ mod tests {
             ..Standing::default()
         };
         assert_eq!(
-            line(&standing, Duration::from_secs(10)),
+            line(&standing, 0, Duration::from_secs(10)),
             "1010/1000 steps, 101/s"
         );
     }
@@ -187,7 +188,6 @@ mod tests {
         assert!(is_due(Style::Terminal, shown, after(0.5)));
         assert!(!is_due(Style::Plain, shown, after(29.0)));
         assert!(is_due(Style::Plain, shown, after(30.0)));
-        assert!(!is_due(Style::Silent, shown, after(99.0)));
     }
 
     #[test]

@@ -53,6 +53,7 @@ fn help_teaches_every_command() {
     let mut help = type_in("--help").succeeds();
     for command in [
         "train",
+        "resume",
         "evaluate",
         "certify",
         "reproduce figure5",

@@ -11,7 +11,7 @@ pub(crate) use bench::{
     BenchArgs, BenchCommand, BenchEnvironmentArgs, BenchTrainArgs, BenchUpdateArgs,
 };
 pub(crate) use configuration::ConfigurationArgs;
-pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, TrainArgs};
+pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, TrainArgs};
 
 /// Teaches teams to coordinate without communicating, by acting jointly on what they commonly know.
 ///
@@ -19,7 +19,7 @@ pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, TrainArgs};
 /// StarCraft, no Python and no GPU are needed.
 ///
 /// Results go to stdout, everything else to stderr. Exit codes: 0 success, 1 a failed certificate, 2 usage, 64 a bad
-/// configuration, 65 bad data, 70 a defect of this program, 74 input or output.
+/// configuration, 65 bad data, 70 a defect of this program, 74 input or output, 75 stopped by a signal: go on with `mackrl resume`.
 #[derive(Debug, Parser)]
 #[command(name = "mackrl", version, max_term_width = 100)]
 pub(crate) struct Cli {
@@ -30,6 +30,7 @@ pub(crate) struct Cli {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     Train(TrainArgs),
+    Resume(ResumeArgs),
     Evaluate(EvaluateArgs),
     Certify(CertifyArgs),
     #[command(hide = true)]

@@ -9,8 +9,10 @@ use crate::args::ConfigurationArgs;
 /// Train a team, and write its weights, metrics and configuration into a run folder
 ///
 /// The folder holds config.toml (everything that determines the result), metrics.jsonl (one JSON object a line),
-/// weights.safetensors (readable from PyTorch) and run.json (command, version, status). A folder that holds a run is never
-/// overwritten. The number of threads changes the speed and nothing else.
+/// weights.safetensors (readable from PyTorch), checkpoints/ (from which an interrupted run goes on) and run.json (command,
+/// version, status). A folder that holds a run is never overwritten. The number of threads changes the speed and nothing else.
+///
+/// SIGINT (Ctrl-C), SIGTERM and SIGUSR1 write a checkpoint and stop with exit code 75; a second SIGINT stops at once.
 ///
 /// Example: mackrl train --map 3m --algorithm mackrl --preset paper --seed 1
 #[derive(Debug, Args)]
@@ -21,6 +23,26 @@ pub(crate) struct TrainArgs {
     /// Run folder to create [default: runs/MAP-ALGORITHM-seedSEED]
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+
+    #[command(flatten)]
+    pub(crate) threads: ThreadsArgs,
+
+    /// Print a JSON summary at the end instead of a sentence
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Continue an interrupted run, to the byte as if it had never stopped
+///
+/// Starts at the latest intact checkpoint, whatever stopped the run: a signal, a kill, a full disk, a loss of power. Weights,
+/// checkpoints and metrics (those under sys/ aside) become those of an uninterrupted run, on any number of threads.
+///
+/// Example: mackrl resume runs/3m-mackrl-seed1
+#[derive(Debug, Args)]
+pub(crate) struct ResumeArgs {
+    /// Run folder that `mackrl train` wrote
+    #[arg(value_name = "DIR")]
+    pub(crate) run: PathBuf,
 
     #[command(flatten)]
     pub(crate) threads: ThreadsArgs,
@@ -96,6 +118,10 @@ pub(crate) struct ExecuteAgentArgs {
     /// Number of the agent, from 0
     #[arg(long, value_name = "I")]
     pub(crate) agent: usize,
+
+    /// Weights of the team [default: those of the run]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) weights: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

@@ -32,7 +32,12 @@ fn certify(folder: &Path, run: &Run, args: &CertifyArgs) -> anyhow::Result<Certi
     let policy = assembly::policy(&run.config, &world)?;
     let weights = policy.weights(&read_weights(policy.layout(), &run.weights)?);
     let mut links = (0..world.spec().agents)
-        .map(|agent| Ok(Box::new(AgentProcess::start(folder, agent)?) as Box<dyn AgentLink>))
+        .map(|agent| {
+            Ok(
+                Box::new(AgentProcess::start(folder, &run.weights_path, agent)?)
+                    as Box<dyn AgentLink>,
+            )
+        })
         .collect::<anyhow::Result<Vec<_>>>()?;
     let mut environment = world.environments(1)?.remove(0);
     let mut subject = Subject {
@@ -55,12 +60,15 @@ struct AgentProcess {
 }
 
 impl AgentProcess {
-    fn start(folder: &Path, agent: usize) -> anyhow::Result<Self> {
+    fn start(folder: &Path, weights: &Path, agent: usize) -> anyhow::Result<Self> {
         let program = std::env::current_exe().context("cannot find this program")?;
         let mut child = Command::new(program)
             .arg("execute-agent")
             .arg(folder)
             .args(["--agent", &agent.to_string()])
+            // A run that goes on has other weights by the time that the last process starts.
+            .arg("--weights")
+            .arg(weights)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()

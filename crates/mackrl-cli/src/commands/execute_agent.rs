@@ -15,7 +15,10 @@ use crate::{args::ExecuteAgentArgs, failure::Failure, run_folder::Run};
 
 /// Answers what arrives on stdin until it ends.
 pub(crate) fn run(args: &ExecuteAgentArgs) -> anyhow::Result<()> {
-    let run = Run::open(&args.run)?;
+    let run = match &args.weights {
+        Some(weights) => Run::open_with_weights(&args.run, weights)?,
+        None => Run::open(&args.run)?,
+    };
     let world = World::new(&run.config)?;
     let agents = world.spec().agents;
     if args.agent >= agents {

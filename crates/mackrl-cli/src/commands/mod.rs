@@ -7,4 +7,5 @@ pub(crate) mod evaluate;
 pub(crate) mod execute_agent;
 pub(crate) mod maps;
 pub(crate) mod reproduce;
+pub(crate) mod resume;
 pub(crate) mod train;

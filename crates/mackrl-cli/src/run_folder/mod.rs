@@ -4,30 +4,41 @@
 //! DIR/config.toml           everything that determines the result; written before the first step
 //! DIR/run.json              command line, version, status
 //! DIR/metrics.jsonl         one JSON object a line
-//! DIR/weights.safetensors   the policy and the critic
+//! DIR/checkpoints/          the latest few, from which the run continues
+//! DIR/weights.safetensors   the policy and the critic; written at the end
+//! DIR/lock                  held by the process that writes
 //! ```
 //!
-//! A folder belongs to one run for ever: nothing in it is overwritten by another. Files that are replaced (`run.json`,
-//! `weights.safetensors`) are replaced atomically, so that whoever reads them finds the old content or the new.
+//! A folder belongs to one run for ever, and has one writer at a time. Files that are replaced are replaced atomically, so that
+//! whoever reads them finds the old content or the new. Metrics are synced before the checkpoint that counts them, and cut back
+//! to a checkpoint when the run continues from it: each row stands there once.
 
-mod atomic;
+mod checkpoints;
+mod disk;
+mod manifest;
+mod run;
 
 use std::{
-    fs::{self, File},
-    io::{self, Write},
+    fs::{self, File, OpenOptions, TryLockError},
+    io,
     path::{Path, PathBuf},
 };
 
 use anyhow::Context;
-use mackrl::config::{Config, ConfigBuilder};
+use mackrl::{config::Config, training::Checkpoint};
 use serde::{Deserialize, Serialize};
 
 use crate::failure::Failure;
+use checkpoints::Surroundings;
+use disk::{Disk, RealDisk, cannot, cannot_write};
+use manifest::{Fingerprint, Growing};
+pub(crate) use run::Run;
 
 const CONFIG: &str = "config.toml";
 const METRICS: &str = "metrics.jsonl";
 const RUN: &str = "run.json";
 const WEIGHTS: &str = "weights.safetensors";
+const LOCK: &str = "lock";
 
 /// How far a run has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -37,6 +48,8 @@ pub(crate) enum Status {
     Running,
     /// Training reached its end.
     Finished,
+    /// Training stopped because it was asked to.
+    Interrupted,
     /// Training stopped with an error.
     Failed,
 }
@@ -59,8 +72,25 @@ struct RunRecord {
 #[derive(Debug)]
 pub(crate) struct RunFolder {
     path: PathBuf,
+    disk: Box<dyn Disk>,
+    config: Fingerprint,
     metrics: File,
+    metrics_so_far: Growing,
+    checkpoints_kept: usize,
     record: RunRecord,
+    /// Nobody else writes while this is open.
+    _lock: File,
+}
+
+/// A run that goes on.
+#[derive(Debug)]
+pub(crate) struct Resumption {
+    pub(crate) folder: RunFolder,
+    pub(crate) config: Config,
+    /// Where it goes on; a run that was interrupted before its first checkpoint begins again.
+    pub(crate) checkpoint: Option<Checkpoint>,
+    /// Later checkpoints that could not be used, and why.
+    pub(crate) damaged: Vec<String>,
 }
 
 impl RunFolder {
@@ -69,22 +99,33 @@ impl RunFolder {
     /// # Errors
     /// [`Failure::FolderInUse`] if something lies there already.
     pub(crate) fn check_free(path: &Path) -> anyhow::Result<()> {
-        let mut entries = match fs::read_dir(path) {
+        let entries = match fs::read_dir(path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
             entries => entries.with_context(|| cannot("use", path))?,
         };
-        if entries.next().is_none() {
+        // What stands in the folder of a run that was killed before it had a configuration.
+        let unborn = [PathBuf::from(LOCK), disk::temporary(Path::new(CONFIG))];
+        let names: Vec<_> = entries
+            .map(|entry| Ok(entry?.file_name()))
+            .collect::<io::Result<_>>()
+            .with_context(|| cannot("read", path))?;
+        if names
+            .iter()
+            .all(|name| unborn.iter().any(|own| own == name))
+        {
             return Ok(());
         }
-        let holds = match recorded_status(path) {
-            Some(Status::Finished) => "a finished run",
-            Some(_) => "an unfinished run",
-            None if path.join(CONFIG).exists() => "a run",
-            None => "other files",
-        };
-        Err(Failure::FolderInUse {
-            folder: path.to_owned(),
-            holds: holds.to_owned(),
+        let folder = path.to_owned();
+        Err(match recorded_status(path) {
+            Some(Status::Finished) => Failure::FolderInUse {
+                folder,
+                holds: "a finished run".to_owned(),
+            },
+            _ if path.join(CONFIG).exists() => Failure::UnfinishedRun { folder },
+            _ => Failure::FolderInUse {
+                folder,
+                holds: "other files".to_owned(),
+            },
         }
         .into())
     }
@@ -92,29 +133,68 @@ impl RunFolder {
     /// Creates the folder of a new run, with its configuration and an empty list of metrics.
     ///
     /// # Errors
-    /// [`Failure::FolderInUse`] if something lies there already; otherwise the path that could not be written.
+    /// [`Failure::FolderInUse`] or [`Failure::UnfinishedRun`] if something lies there already, [`Failure::FolderLocked`] if
+    /// another process writes there; otherwise the path that could not be written.
     pub(crate) fn create(path: &Path, config: &Config, threads: usize) -> anyhow::Result<Self> {
         Self::check_free(path)?;
         fs::create_dir_all(path).with_context(|| cannot("create", path))?;
-        let new = |name: &str| {
-            let path = path.join(name);
-            File::create_new(&path).with_context(|| cannot("create", &path))
-        };
-        // Whoever creates this file first owns the folder.
-        let mut file = new(CONFIG)?;
-        file.write_all(config.to_toml().as_bytes())
-            .and_then(|()| file.sync_all())
-            .with_context(|| cannot("write", &path.join(CONFIG)))?;
+        let lock = lock(path)?;
+        // Somebody else may have been quicker, and be done already.
+        Self::check_free(path)?;
+        disk::replace(&RealDisk, &path.join(CONFIG), config.to_toml().as_bytes())?;
+        Self::open(path, config, threads, lock, 0)
+    }
+
+    /// Opens the folder of an unfinished run at its latest checkpoint. What was written after it is removed: it will be written
+    /// again.
+    ///
+    /// # Errors
+    /// [`Failure::NotARun`], [`Failure::FolderLocked`] if another process writes there, [`Failure::BadData`] if no checkpoint can
+    /// be used; otherwise the path that could not be read or written.
+    pub(crate) fn resume(path: &Path, threads: usize) -> anyhow::Result<Resumption> {
+        let config = run::read_config(path)?;
+        let lock = lock(path)?;
+        let (latest, damaged) = checkpoints::latest(path)?;
+        let (number, metrics_bytes) = latest.as_ref().map_or((None, 0), |stored| {
+            (Some(stored.number), stored.metrics_bytes)
+        });
+        checkpoints::tidy(&RealDisk, path, number)?;
+        Ok(Resumption {
+            folder: Self::open(path, &config, threads, lock, metrics_bytes)?,
+            config,
+            checkpoint: latest.map(|stored| stored.checkpoint),
+            damaged,
+        })
+    }
+
+    /// Opens the folder with so many bytes of metrics.
+    fn open(
+        path: &Path,
+        config: &Config,
+        threads: usize,
+        lock: File,
+        metrics_bytes: usize,
+    ) -> anyhow::Result<Self> {
+        let config_path = path.join(CONFIG);
+        let config_text = fs::read(&config_path).with_context(|| cannot("read", &config_path))?;
+        let (metrics, metrics_so_far) = open_metrics(&path.join(METRICS), metrics_bytes)?;
+        let mut record = read_record(path).unwrap_or_else(|| RunRecord {
+            command: std::env::args().collect(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            seed: config.run.seed,
+            threads,
+            status: Status::Running,
+        });
+        record.threads = threads;
         let mut folder = Self {
             path: path.to_owned(),
-            metrics: new(METRICS)?,
-            record: RunRecord {
-                command: std::env::args().collect(),
-                version: env!("CARGO_PKG_VERSION").to_owned(),
-                seed: config.run.seed,
-                threads,
-                status: Status::Running,
-            },
+            disk: Box::new(RealDisk),
+            config: Fingerprint::of(&config_text),
+            metrics,
+            metrics_so_far,
+            checkpoints_kept: config.run.checkpoints_kept,
+            record,
+            _lock: lock,
         };
         folder.set_status(Status::Running)?;
         Ok(folder)
@@ -128,9 +208,37 @@ impl RunFolder {
     /// Adds one line to the metrics.
     pub(crate) fn append_metrics(&mut self, object: &str) -> anyhow::Result<()> {
         debug_assert!(!object.contains('\n'), "a row of metrics is one line");
-        self.metrics
-            .write_all(format!("{object}\n").as_bytes())
-            .with_context(|| cannot("write", &self.path.join(METRICS)))
+        let line = format!("{object}\n");
+        self.disk
+            .write(&mut self.metrics, line.as_bytes())
+            .with_context(|| cannot_write(&self.path.join(METRICS), line.len()))?;
+        self.metrics_so_far.append(line.as_bytes());
+        Ok(())
+    }
+
+    /// Writes the checkpoint with this number, after the metrics that belong to it, and removes old ones.
+    ///
+    /// # Errors
+    /// Path, bytes and what the operating system says; earlier checkpoints are intact then.
+    pub(crate) fn write_checkpoint(
+        &mut self,
+        number: u64,
+        checkpoint: &Checkpoint,
+    ) -> anyhow::Result<()> {
+        self.disk
+            .sync(&self.metrics)
+            .with_context(|| cannot("sync", &self.path.join(METRICS)))?;
+        let surroundings = Surroundings {
+            config: self.config.clone(),
+            metrics: self.metrics_so_far.fingerprint(),
+        };
+        checkpoints::write(
+            &*self.disk,
+            &self.path,
+            (number, checkpoint),
+            surroundings,
+            self.checkpoints_kept,
+        )
     }
 
     /// Puts the weights in place of earlier ones.
@@ -146,62 +254,54 @@ impl RunFolder {
     }
 
     fn replace(&self, name: &str, content: &[u8]) -> anyhow::Result<()> {
-        let path = self.path.join(name);
-        atomic::replace(&path, content)
-            .with_context(|| format!("{} ({} bytes)", cannot("write", &path), content.len()))
+        disk::replace(&*self.disk, &self.path.join(name), content)
     }
 }
 
-/// A run that was made earlier.
-#[derive(Debug)]
-pub(crate) struct Run {
-    /// Its configuration.
-    pub(crate) config: Config,
-    /// Its weights as safetensors.
-    pub(crate) weights: Vec<u8>,
+/// Takes the folder for this process until the file is closed; the operating system closes it, however the process ends.
+fn lock(path: &Path) -> anyhow::Result<File> {
+    let lock_path = path.join(LOCK);
+    let lock = OpenOptions::new()
+        .create(true)
+        .truncate(false)
+        .write(true)
+        .open(&lock_path)
+        .with_context(|| cannot("open", &lock_path))?;
+    match lock.try_lock() {
+        Ok(()) => Ok(lock),
+        Err(TryLockError::WouldBlock) => {
+            let folder = path.to_owned();
+            Err(Failure::FolderLocked { folder }.into())
+        }
+        Err(TryLockError::Error(error)) => Err(error).with_context(|| cannot("lock", &lock_path)),
+    }
 }
 
-impl Run {
-    /// Reads configuration and weights.
-    ///
-    /// # Errors
-    /// [`Failure::NotARun`] if there is no configuration; otherwise what is wrong with which file.
-    pub(crate) fn open(path: &Path) -> anyhow::Result<Self> {
-        let config_path = path.join(CONFIG);
-        let text = match fs::read_to_string(&config_path) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                let folder = path.to_owned();
-                return Err(Failure::NotARun { folder }.into());
-            }
-            text => text.with_context(|| cannot("read", &config_path))?,
-        };
-        let config = ConfigBuilder::new()
-            .file(&config_path.display().to_string(), &text)?
-            .build()?;
-        let weights_path = path.join(WEIGHTS);
-        let weights = match fs::read(&weights_path) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                let message = format!(
-                    "{} has no {WEIGHTS}: the run did not reach its end",
-                    path.display()
-                );
-                return Err(Failure::BadData { message }.into());
-            }
-            weights => weights.with_context(|| cannot("read", &weights_path))?,
-        };
-        Ok(Self { config, weights })
-    }
+/// Opens the metrics for appending, and cuts off everything after the first `bytes` bytes.
+fn open_metrics(path: &Path, bytes: usize) -> anyhow::Result<(File, Growing)> {
+    let file = OpenOptions::new()
+        .create(true)
+        .append(true)
+        .open(path)
+        .with_context(|| cannot("open", path))?;
+    file.set_len(bytes as u64)
+        .and_then(|()| file.sync_all())
+        .with_context(|| cannot("cut", path))?;
+    let mut so_far = Growing::default();
+    so_far.append(&fs::read(path).with_context(|| cannot("read", path))?);
+    Ok((file, so_far))
 }
 
 fn recorded_status(path: &Path) -> Option<Status> {
+    Some(read_record(path)?.status)
+}
+
+fn read_record(path: &Path) -> Option<RunRecord> {
     let text = fs::read_to_string(path.join(RUN)).ok()?;
-    let record: RunRecord = serde_json::from_str(&text).ok()?;
-    Some(record.status)
+    serde_json::from_str(&text).ok()
 }
 
-fn cannot(verb: &str, path: &Path) -> String {
-    format!("cannot {verb} {}", path.display())
-}
-
+#[cfg(test)]
+mod faults;
 #[cfg(test)]
 mod tests;

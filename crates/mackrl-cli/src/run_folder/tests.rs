@@ -63,7 +63,7 @@ fn a_folder_without_a_run_or_with_half_of_one_is_named() {
     RunFolder::create(&path, &Config::default(), 1).unwrap();
     let error = Run::open(&path).unwrap_err();
     assert!(
-        error.to_string().contains("did not reach its end"),
+        error.to_string().contains("the run has only begun"),
         "{error}"
     );
 }

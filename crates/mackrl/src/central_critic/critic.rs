@@ -6,8 +6,8 @@ use super::{ReturnSettings, lambda_returns};
 use crate::{
     Error,
     nn::{
-        FeedForward, FeedForwardTrace, FeedForwardWeights, NetworkSizes, Optimiser, OptimiserKind,
-        ParameterLayout, clip_gradient_norm, first_not_finite,
+        FeedForward, FeedForwardTrace, FeedForwardWeights, Moments, NetworkSizes, Optimiser,
+        OptimiserKind, ParameterLayout, clip_gradient_norm, first_not_finite,
     },
     rollout::Episode,
 };
@@ -44,6 +44,21 @@ pub struct CriticReport {
     pub target_mean: f64,
 }
 
+/// All that a critic has learnt: with its settings, everything that its future depends on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CriticState {
+    /// The parameters.
+    pub parameters: Vec<f32>,
+    /// Those of the target copy.
+    pub target_parameters: Vec<f32>,
+    /// What the optimiser remembers.
+    pub moments: Moments<f32>,
+    /// Updates so far.
+    pub updates: u64,
+    /// Updates when the target copy was refreshed.
+    pub updates_at_refresh: u64,
+}
+
 /// V(s), a feed-forward network, with a target copy.
 #[derive(Debug)]
 pub struct CentralCritic {
@@ -52,6 +67,7 @@ pub struct CentralCritic {
     network: FeedForward,
     parameters: Vec<f32>,
     weights: FeedForwardWeights<f32>,
+    target_parameters: Vec<f32>,
     target_weights: FeedForwardWeights<f32>,
     optimiser: Optimiser<f32>,
     gradient: Vec<f32>,
@@ -87,6 +103,7 @@ impl CentralCritic {
         Self {
             settings,
             weights: network.weights(&parameters),
+            target_parameters: parameters.clone(),
             target_weights: network.weights(&parameters),
             optimiser: Optimiser::new(settings.optimiser, parameters.len()),
             gradient: vec![0.0; parameters.len()],
@@ -109,6 +126,33 @@ impl CentralCritic {
     #[must_use]
     pub fn parameters(&self) -> &[f32] {
         &self.parameters
+    }
+
+    /// What a checkpoint must hold.
+    #[must_use]
+    pub fn state(&self) -> CriticState {
+        CriticState {
+            parameters: self.parameters.clone(),
+            target_parameters: self.target_parameters.clone(),
+            moments: self.optimiser.moments().clone(),
+            updates: self.updates,
+            updates_at_refresh: self.updates_at_refresh,
+        }
+    }
+
+    /// Continues from a checkpoint.
+    ///
+    /// # Panics
+    /// If the state is that of a critic of another size or optimiser.
+    pub fn restore(&mut self, state: CriticState) {
+        self.network.refresh(&state.parameters, &mut self.weights);
+        self.network
+            .refresh(&state.target_parameters, &mut self.target_weights);
+        self.optimiser.restore(state.moments);
+        self.parameters = state.parameters;
+        self.target_parameters = state.target_parameters;
+        self.updates = state.updates;
+        self.updates_at_refresh = state.updates_at_refresh;
     }
 
     /// Learns from a batch of episodes and writes their advantages.
@@ -155,8 +199,9 @@ impl CentralCritic {
 
     fn refresh_target_if_due(&mut self) {
         if self.updates - self.updates_at_refresh >= self.settings.target_interval_updates {
+            self.target_parameters.copy_from_slice(&self.parameters);
             self.network
-                .refresh(&self.parameters, &mut self.target_weights);
+                .refresh(&self.target_parameters, &mut self.target_weights);
             self.updates_at_refresh = self.updates;
         }
     }

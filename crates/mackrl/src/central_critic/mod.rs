@@ -7,5 +7,5 @@ mod critic;
 mod returns;
 
 pub(crate) use critic::not_finite;
-pub use critic::{CentralCritic, CriticReport, CriticSettings};
+pub use critic::{CentralCritic, CriticReport, CriticSettings, CriticState};
 pub use returns::{ReturnSettings, lambda_returns};

@@ -22,7 +22,7 @@ pub struct Config {
     pub learner: LearnerConfig,
     /// Greedy tests during training.
     pub test: TestConfig,
-    /// Length and seed.
+    /// Length, seed, and what is written when.
     pub run: RunConfig,
 }
 
@@ -89,12 +89,16 @@ section! {
 }
 
 section! {
-    /// Length and seed of a run.
+    /// Length and seed of a run, and what is written when.
     "run" RunConfig {
         /// Environment steps after which training ends; the batch that reaches it is finished.
         steps_env: u64 = 1_000_000, "an integer in [1, 2^53]", |steps| (1..=EXACT).contains(steps);
         /// Environment steps between two rows of training metrics; tests give rows of their own.
         metrics_interval_steps_env: u64 = 2_000, "an integer in [1, 2^53]", |steps| (1..=EXACT).contains(steps);
+        /// Environment steps between two checkpoints; one more is written at the end. Changes no result.
+        checkpoint_interval_steps_env: u64 = 200_000, "an integer in [1, 2^53]", |steps| (1..=EXACT).contains(steps);
+        /// Checkpoints that stay in the run folder; older ones are removed. Changes no result.
+        checkpoints_kept: usize = 2, "an integer in [1, 1000]", |kept| (1..=1000).contains(kept);
         /// Seed from which every random draw of the run is derived; known to all agents.
         seed: u64 = 1, "an integer in [0, 2^53]", |seed| (0..=EXACT).contains(seed);
     }

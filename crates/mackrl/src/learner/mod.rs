@@ -10,8 +10,8 @@ use mackrl_env::{EpisodeKey, Stream};
 
 use crate::{
     Error, Phase, Stopwatch,
-    central_critic::{CentralCritic, CriticReport, CriticSettings, not_finite},
-    nn::{Optimiser, OptimiserKind, clip_gradient_norm, first_not_finite},
+    central_critic::{CentralCritic, CriticReport, CriticSettings, CriticState, not_finite},
+    nn::{Moments, Optimiser, OptimiserKind, clip_gradient_norm, first_not_finite},
     parallel::for_each_in_parallel,
     policy::{Policy, Weights},
     rollout::{Episode, ShardBatch},
@@ -41,6 +41,19 @@ pub struct UpdateReport {
     pub advantage_mean: f64,
     /// What the critic's sweep did.
     pub critic: CriticReport,
+}
+
+/// All that a learner has learnt: with its settings, everything that its future depends on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LearnerState {
+    /// The policy's parameters.
+    pub parameters: Vec<f32>,
+    /// What the policy's optimiser remembers.
+    pub moments: Moments<f32>,
+    /// Policy updates so far.
+    pub updates: u64,
+    /// The critic.
+    pub critic: CriticState,
 }
 
 /// The policy's parameters, the critic, and how both change.
@@ -117,13 +130,37 @@ impl Learner {
         self.updates
     }
 
+    /// What a checkpoint must hold.
+    #[must_use]
+    pub fn state(&self) -> LearnerState {
+        LearnerState {
+            parameters: self.parameters.clone(),
+            moments: self.optimiser.moments().clone(),
+            updates: self.updates,
+            critic: self.critic.state(),
+        }
+    }
+
+    /// Continues from a checkpoint.
+    ///
+    /// # Panics
+    /// If the state is that of another policy, critic or optimiser.
+    pub fn restore(&mut self, policy: &dyn Policy, state: LearnerState) {
+        policy.refresh(&state.parameters, &mut self.weights);
+        self.optimiser.restore(state.moments);
+        self.critic.restore(state.critic);
+        self.parameters = state.parameters;
+        self.updates = state.updates;
+    }
+
     /// Learns from the batch that `shards` hold, and books the time that it takes.
     ///
     /// # Equation
     /// `∇J = 1 / (N Σ_b T_b) Σ_{b,t} A_{bt} ∇ log p(u_{bt})` (eq. 6), then one step of the optimiser.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] if a gradient is not finite. The policy has not changed then.
+    /// [`Error::NotFinite`] if a reward or a state is not finite, before anything changes; or if a gradient is not finite: the
+    /// policy has not changed then.
     pub fn update(
         &mut self,
         policy: &dyn Policy,
@@ -131,6 +168,7 @@ impl Learner {
         stopwatch: &mut Stopwatch,
     ) -> Result<UpdateReport, Error> {
         let episodes: Vec<&Episode> = shards.iter().flat_map(|shard| &shard.episodes).collect();
+        self.check_finite(&episodes)?;
         let steps: usize = episodes.iter().map(|episode| episode.steps()).sum();
         let critic = self.critic.sweep(&episodes, &mut self.advantage_bt)?;
         let advantages = self.advantage_bt.iter().flatten();
@@ -161,6 +199,25 @@ impl Learner {
             advantage_mean,
             critic,
         })
+    }
+
+    /// Refuses episodes that hold a number that is not finite.
+    fn check_finite(&self, episodes: &[&Episode]) -> Result<(), Error> {
+        for (b, episode) in episodes.iter().enumerate() {
+            for (what, numbers) in [("reward", &episode.reward_t), ("state", &episode.state_tg)] {
+                if let Some(index) = first_not_finite(numbers) {
+                    // T rewards, but T + 1 states.
+                    let times = episode.steps() + usize::from(what == "state");
+                    let t = index * times / numbers.len();
+                    return Err(Error::NotFinite {
+                        tensor: format!("{what} at step {t} of episode {b} of the batch"),
+                        value: f64::from(numbers[index]),
+                        update: self.updates,
+                    });
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Computes the gradient of −J into the first shard's gradient and returns J.
@@ -217,6 +274,8 @@ mod tests {
 
     use super::*;
     use crate::{
+        baselines::CentralV,
+        central_critic::ReturnSettings,
         config::Config,
         policy::{Actor, Behaviour, ControllerInput, Recording, Situation, Tally},
         rollout::{Rollout, RolloutSettings},
@@ -224,7 +283,7 @@ mod tests {
     };
 
     /// An actor whose gradient is broken in one place.
-    struct Broken(usize);
+    struct Broken(usize, Stopwatch);
 
     impl Actor for Broken {
         fn begin(&mut self, _: Recording) {}
@@ -236,6 +295,9 @@ mod tests {
         fn report(&self, _: &mut Tally) {}
         fn controller_inputs(&self, _: usize) -> Vec<ControllerInput> {
             Vec::new()
+        }
+        fn stopwatch(&mut self) -> &mut Stopwatch {
+            &mut self.1
         }
     }
 
@@ -257,18 +319,95 @@ mod tests {
         rollout.play(learner.weights(), &keys, settings).unwrap();
         let mut broken = ShardBatch {
             episodes: rollout.batches().next().unwrap().episodes.clone(),
-            actor: Box::new(Broken(policy.layout().len() - 1)),
+            actor: Box::new(Broken(policy.layout().len() - 1, Stopwatch::default())),
         };
         let before = learner.parameters().to_vec();
-        let error = learner.update(&*policy, vec![&mut broken]).unwrap_err();
+        let error = learner
+            .update(&*policy, vec![&mut broken], &mut Stopwatch::default())
+            .unwrap_err();
         let name = &policy.layout().tensors().last().unwrap().name;
         assert!(error.to_string().contains(name), "{error}");
         assert_eq!(learner.parameters(), before);
         assert_eq!(learner.updates(), 0);
         learner
-            .update(&*policy, rollout.batches().collect())
+            .update(
+                &*policy,
+                rollout.batches().collect(),
+                &mut Stopwatch::default(),
+            )
             .unwrap();
         assert_ne!(learner.parameters(), before);
         assert_eq!(learner.updates(), 1);
+    }
+
+    /// A learner of the built-in map and a batch of two episodes.
+    fn prepare() -> (CentralV, Learner, Rollout) {
+        let environments = || Config::default().env.make().unwrap();
+        let spec = environments().spec().clone();
+        let policy = CentralV::new(&spec, 5);
+        let settings = LearnerSettings {
+            optimiser: OptimiserKind::ADAM,
+            learning_rate: 1e-3,
+            gradient_norm_max: 10.0,
+            critic: CriticSettings {
+                hidden: 5,
+                optimiser: OptimiserKind::ADAM,
+                learning_rate: 1e-3,
+                gradient_norm_max: 10.0,
+                returns: ReturnSettings {
+                    gamma: 0.99,
+                    lambda: 0.8,
+                },
+                target_interval_updates: 200,
+                bootstrap_at_time_limit: false,
+            },
+        };
+        let learner = Learner::new(&policy, [spec.agents, spec.state_size], settings, 1, 1);
+        let mut rollout = Rollout::new(&policy, vec![environments(), environments()], 2, 1);
+        let keys = [0, 1].map(|episode| EpisodeKey::new(1, Stream::Training, episode));
+        let settings = RolloutSettings {
+            behaviour: Behaviour::sampled(0.5),
+            recording: Recording::ForLearning,
+        };
+        rollout.play(learner.weights(), &keys, settings).unwrap();
+        (policy, learner, rollout)
+    }
+
+    #[test]
+    fn a_number_that_is_not_finite_is_named_before_anything_changes() {
+        let (policy, mut learner, mut rollout) = prepare();
+        let before = learner.state();
+        let plant = |rollout: &mut Rollout, reward: f32, state: f32| {
+            let batch = rollout.batches().next().unwrap();
+            batch.episodes[1].reward_t[3] = reward;
+            let size = batch.episodes[1].state(0).len();
+            batch.episodes[1].state_tg[7 * size + size - 1] = state;
+        };
+        for (reward, state, expected) in [
+            (
+                f32::NAN,
+                0.0,
+                "reward at step 3 of episode 1 of the batch holds NaN at update 0",
+            ),
+            (
+                0.0,
+                f32::INFINITY,
+                "state at step 7 of episode 1 of the batch holds inf at update 0",
+            ),
+        ] {
+            plant(&mut rollout, reward, state);
+            let batches = rollout.batches().collect();
+            let error = learner
+                .update(&policy, batches, &mut Stopwatch::default())
+                .unwrap_err();
+            assert_eq!(error.to_string(), expected);
+            assert!(learner.state() == before, "nothing has changed");
+        }
+        plant(&mut rollout, 0.0, 0.0);
+        let batches = rollout.batches().collect();
+        learner
+            .update(&policy, batches, &mut Stopwatch::default())
+            .unwrap();
+        assert!(learner.state() != before, "a sound batch is learnt from");
     }
 }

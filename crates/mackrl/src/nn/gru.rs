@@ -152,6 +152,10 @@ impl Gru {
         gates: &mut [E],
         next: &mut [E],
     ) {
+        // No row needs no room: behind the last step there may be less than the columns that are skipped below.
+        if rows == 0 {
+            return;
+        }
         let h = self.hidden;
         let c_stride = GATES * h;
         Product {
@@ -209,6 +213,9 @@ impl Gru {
         gates: &mut [E],
         gradient: &mut [E],
     ) {
+        if rows == 0 {
+            return;
+        }
         let h = self.hidden;
         E::dispatch(Differentiate {
             hidden: h,
@@ -263,6 +270,9 @@ impl Gru {
         gradient: &mut [E],
         scratch: &mut Aligned<E>,
     ) {
+        if rows == 0 {
+            return;
+        }
         let h = self.hidden;
         let x = Rows {
             values: x,
@@ -312,5 +322,26 @@ impl Gru {
             sums: &mut gradient[self.bias_hh.clone()],
         }
         .compute();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn issue_4_a_step_without_rows_needs_no_room() {
+        let mut layout = ParameterLayout::new();
+        let gru = Gru::new(&mut layout, "gru", 3, 5);
+        let parameters = vec![0.1_f32; layout.len()];
+        let mut weights = GruWeights::default();
+        gru.refresh_forward(&parameters, &mut weights);
+        gru.refresh_backward(&parameters, &mut weights);
+        gru.forward(&weights, 0, &[], &[], &mut [], &mut []);
+        gru.hidden_gradient(&weights, 0, &[], &mut [], &mut []);
+        let mut gradient = vec![0.0; layout.len()];
+        let scratch = &mut Aligned::default();
+        gru.parameter_gradient(0, &[], &[], &[], &mut gradient, scratch);
+        assert_eq!(gradient, vec![0.0; layout.len()]);
     }
 }

@@ -47,6 +47,16 @@ impl ParameterLayout {
         range
     }
 
+    /// The same places under names that begin with `prefix`, for what stands beside the parameters in a checkpoint.
+    #[must_use]
+    pub fn prefixed(&self, prefix: &str) -> Self {
+        let mut layout = self.clone();
+        for tensor in &mut layout.tensors {
+            tensor.name.insert_str(0, prefix);
+        }
+        layout
+    }
+
     /// All tensors, in the order of their places.
     #[must_use]
     pub fn tensors(&self) -> &[TensorSpec] {

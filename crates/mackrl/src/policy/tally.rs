@@ -2,8 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
+
 /// Named sums with their counts.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
 pub struct Tally {
     sums: BTreeMap<String, (f64, f64)>,
 }
@@ -21,6 +24,11 @@ impl Tally {
         for (name, &(sum, count)) in &other.sums {
             self.add(name.clone(), sum, count);
         }
+    }
+
+    /// Every name, in alphabetical order.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.sums.keys().map(String::as_str)
     }
 
     /// The mean of each name that was observed at least once, in alphabetical order.

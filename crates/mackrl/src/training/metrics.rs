@@ -180,7 +180,7 @@ const fn as_count(value: f64) -> u64 {
     value as u64
 }
 
-fn is_explained(name: &str) -> bool {
+pub(super) fn is_explained(name: &str) -> bool {
     METRICS.iter().any(|(explained, _)| {
         name.strip_prefix(explained).is_some_and(|rest| {
             rest.is_empty() || explained.ends_with('_') && rest.bytes().all(|b| b.is_ascii_digit())

@@ -5,11 +5,13 @@
 //! machine and the clock.
 
 pub mod assembly;
+mod checkpoint;
 mod evaluation;
 mod metrics;
 mod trainer;
 mod weights;
 
+pub use checkpoint::Checkpoint;
 pub use evaluation::{Evaluation, evaluate};
 pub use metrics::{METRICS, MetricRow};
 pub use trainer::Trainer;

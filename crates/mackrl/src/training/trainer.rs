@@ -4,7 +4,12 @@ use std::time::Instant;
 
 use mackrl_env::{EpisodeKey, Stream};
 
-use super::{Evaluation, MetricRow, assembly, evaluation::Evaluator, write_weights};
+use super::{
+    Checkpoint, Evaluation, MetricRow, assembly,
+    checkpoint::{Counters, Layouts, State},
+    evaluation::Evaluator,
+    write_weights,
+};
 use crate::{
     Error, Phase, Stopwatch,
     config::Config,
@@ -37,7 +42,10 @@ pub struct Trainer {
 struct Interval {
     tally: Tally,
     began: Instant,
+    /// Environment steps when the interval began; a row after a resumption still tells of the whole interval.
     steps_env: u64,
+    /// Environment steps when the clock began: later than `steps_env` after a resumption.
+    steps_env_timed: u64,
 }
 
 impl Trainer {
@@ -121,6 +129,58 @@ impl Trainer {
         &self.stopwatch
     }
 
+    /// Updates and tests so far: the number of times that [`update`](Self::update) went well in this run, resumptions included.
+    #[must_use]
+    pub const fn iterations(&self) -> u64 {
+        self.learner.updates() + self.tests
+    }
+
+    /// Everything that the rest of the run depends on, the configuration aside.
+    #[must_use]
+    pub fn checkpoint(&self) -> Checkpoint {
+        let state = State {
+            learner: self.learner.state(),
+            counters: Counters {
+                steps_env: self.steps_env,
+                episodes: self.episodes,
+                tests: self.tests,
+                next_test: self.next_test,
+                next_row: self.next_row,
+                interval_steps_env: self.interval.steps_env,
+                interval: self.interval.tally.clone(),
+            },
+        };
+        Checkpoint::write(&self.layouts(), &state)
+    }
+
+    /// Continues where `checkpoint` was taken: what follows is the same to the byte as if there had been no interruption.
+    ///
+    /// # Errors
+    /// [`Error::Data`] if the checkpoint is damaged or belongs to another configuration. Nothing has changed then.
+    pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), Error> {
+        let State { learner, counters } = checkpoint.read(&self.layouts())?;
+        self.learner.restore(&*self.policy, learner);
+        self.steps_env = counters.steps_env;
+        self.episodes = counters.episodes;
+        self.tests = counters.tests;
+        self.next_test = counters.next_test;
+        self.next_row = counters.next_row;
+        self.interval = Interval {
+            tally: counters.interval,
+            steps_env: counters.interval_steps_env,
+            ..Interval::new(counters.steps_env)
+        };
+        Ok(())
+    }
+
+    fn layouts(&self) -> Layouts<'_> {
+        Layouts {
+            policy: self.policy.layout(),
+            critic: self.learner.critic().layout(),
+            optimiser: assembly::learner(&self.config).optimiser,
+        }
+    }
+
     /// ε of the bounded softmax now: it falls linearly with the environment steps.
     fn exploration(&self) -> f64 {
         let schedule = &self.config.exploration;
@@ -189,7 +249,7 @@ impl Trainer {
             .tally
             .means()
             .for_each(|(name, mean)| row.push(name, mean));
-        let played = (self.steps_env - interval.steps_env) as f64;
+        let played = (self.steps_env - interval.steps_env_timed) as f64;
         if played > 0.0 {
             row.push(
                 "sys/sps",
@@ -206,6 +266,7 @@ impl Interval {
             tally: Tally::default(),
             began: Instant::now(),
             steps_env,
+            steps_env_timed: steps_env,
         }
     }
 

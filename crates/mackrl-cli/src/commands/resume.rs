@@ -1,0 +1,35 @@
+//! `mackrl resume`: an interrupted run goes on.
+
+use std::io::{self, Write};
+
+use mackrl::training::Trainer;
+
+use crate::{
+    args::ResumeArgs,
+    run_folder::{Resumption, RunFolder},
+    signals::StopRequest,
+    training_loop::{self, Reporting},
+};
+
+/// Continues a run at its latest checkpoint; from then on it is as if it had never stopped.
+pub(crate) fn run(args: &ResumeArgs) -> anyhow::Result<()> {
+    let stop = StopRequest::listen()?;
+    let threads = args.threads.count();
+    let Resumption {
+        mut folder,
+        config,
+        checkpoint,
+        damaged,
+    } = RunFolder::resume(&args.run, threads)?;
+    for damage in damaged {
+        // The run continues from an earlier checkpoint, whether anybody reads this or not.
+        let _ = writeln!(io::stderr(), "warning: {damage}; an earlier one is used");
+    }
+    let mut trainer = Trainer::new(&config, threads)?;
+    if let Some(checkpoint) = checkpoint {
+        trainer.restore(&checkpoint)?;
+    }
+    let mut training = Reporting::new(trainer, &config);
+    let summary = training_loop::train_into(&mut folder, &mut training, &config, &stop)?;
+    training_loop::print(&summary, args.json)
+}

@@ -1,0 +1,234 @@
+//! The checkpoints of a run.
+//!
+//! ```text
+//! checkpoints/000000000042/              after 42 updates and tests
+//!     tensors.safetensors                parameters, target critic, moments of the optimisers
+//!     counters.json                      counters, schedules, sums of the unfinished row of metrics
+//!     manifest.json                      length and hash of these, of config.toml, and of metrics.jsonl so far
+//! ```
+//!
+//! A checkpoint is made under a temporary name, and loses its name before it is removed. So a folder without the ending `.tmp`
+//! is whole, whenever the program or the machine stopped. Two checkpoints of one number are equal to the byte, because a run
+//! is a function of its configuration.
+
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+use anyhow::Context;
+use mackrl::training::Checkpoint;
+
+use super::{
+    CONFIG, METRICS,
+    disk::{self, Disk, cannot},
+    manifest::{FORMAT, Fingerprint, Manifest},
+};
+use crate::failure::Failure;
+
+const CHECKPOINTS: &str = "checkpoints";
+const TENSORS: &str = "tensors.safetensors";
+const COUNTERS: &str = "counters.json";
+const MANIFEST: &str = "manifest.json";
+/// Digits of a number in the name of its folder: names sort as numbers do.
+const DIGITS: usize = 12;
+
+/// The files of the run that a checkpoint continues.
+#[derive(Debug, Clone)]
+pub(super) struct Surroundings {
+    pub(super) config: Fingerprint,
+    pub(super) metrics: Fingerprint,
+}
+
+/// A checkpoint that was read and is as it was written.
+#[derive(Debug, Clone)]
+pub(super) struct Stored {
+    pub(super) number: u64,
+    pub(super) checkpoint: Checkpoint,
+    /// Bytes of metrics that belong to it.
+    pub(super) metrics_bytes: usize,
+}
+
+/// Writes the checkpoint with this number, unless it is there, and removes all but the latest `kept`.
+///
+/// # Errors
+/// Path, bytes and what the operating system says; earlier checkpoints are intact then.
+pub(super) fn write(
+    disk: &dyn Disk,
+    run: &Path,
+    (number, checkpoint): (u64, &Checkpoint),
+    surroundings: Surroundings,
+    kept: usize,
+) -> anyhow::Result<()> {
+    let place = place(run, number);
+    if !place.exists() {
+        create_parent(disk, run)?;
+        make(disk, &place, checkpoint, surroundings)?;
+    }
+    let numbers = numbers(run)?;
+    for &old in &numbers[..numbers.len().saturating_sub(kept)] {
+        remove(disk, run, old)?;
+    }
+    Ok(())
+}
+
+fn create_parent(disk: &dyn Disk, run: &Path) -> anyhow::Result<()> {
+    let parent = run.join(CHECKPOINTS);
+    if parent.exists() {
+        return Ok(());
+    }
+    disk.create_folder(&parent)
+        .with_context(|| cannot("create", &parent))?;
+    disk::sync_folder(disk, run)
+}
+
+fn make(
+    disk: &dyn Disk,
+    place: &Path,
+    checkpoint: &Checkpoint,
+    Surroundings { config, metrics }: Surroundings,
+) -> anyhow::Result<()> {
+    let contents = [
+        (TENSORS, &checkpoint.tensors),
+        (COUNTERS, &checkpoint.counters),
+    ];
+    let manifest = Manifest {
+        format: FORMAT,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        config,
+        metrics,
+        files: contents
+            .iter()
+            .map(|(name, content)| ((*name).to_owned(), Fingerprint::of(content)))
+            .collect(),
+    };
+    let manifest = serde_json::to_string_pretty(&manifest)? + "\n";
+    let temporary = disk::temporary(place);
+    disk.create_folder(&temporary)
+        .with_context(|| cannot("create", &temporary))?;
+    for (name, content) in contents {
+        disk::write_synced(disk, &temporary.join(name), content)?;
+    }
+    disk::write_synced(disk, &temporary.join(MANIFEST), manifest.as_bytes())?;
+    disk::sync_folder(disk, &temporary)?;
+    disk::rename(disk, &temporary, place)?;
+    disk::sync_folder(disk, &parent(place))
+}
+
+fn remove(disk: &dyn Disk, run: &Path, number: u64) -> anyhow::Result<()> {
+    let place = place(run, number);
+    let temporary = disk::temporary(&place);
+    disk::rename(disk, &place, &temporary)?;
+    disk.remove_folder(&temporary)
+        .with_context(|| cannot("remove", &temporary))
+}
+
+/// The latest checkpoint that is as it was written, if the run has checkpoints, and what is wrong with later ones.
+///
+/// # Errors
+/// [`Failure::BadData`] if there are checkpoints and none can be used.
+pub(super) fn latest(run: &Path) -> anyhow::Result<(Option<Stored>, Vec<String>)> {
+    let mut wrong = Vec::new();
+    for number in numbers(run)?.into_iter().rev() {
+        match read(run, number) {
+            Ok(stored) => return Ok((Some(stored), wrong)),
+            Err(error) => wrong.push(format!(
+                "{} is damaged: {error:#}",
+                place(run, number).display()
+            )),
+        }
+    }
+    if wrong.is_empty() {
+        return Ok((None, wrong));
+    }
+    let message = wrong.join("; ");
+    Err(Failure::BadData { message }.into())
+}
+
+/// Removes what is not complete, and every checkpoint after the one with this number.
+pub(super) fn tidy(disk: &dyn Disk, run: &Path, latest: Option<u64>) -> anyhow::Result<()> {
+    for number in numbers(run)? {
+        if latest.is_some_and(|latest| number > latest) {
+            remove(disk, run, number)?;
+        }
+    }
+    for name in names(run)? {
+        let path = run.join(CHECKPOINTS).join(name);
+        if path.extension().is_some_and(|end| end == disk::TEMPORARY) {
+            disk.remove_folder(&path)
+                .with_context(|| cannot("remove", &path))?;
+        }
+    }
+    Ok(())
+}
+
+/// Where the weights of a checkpoint lie.
+pub(super) fn weights_path(run: &Path, number: u64) -> PathBuf {
+    place(run, number).join(TENSORS)
+}
+
+/// Reads a checkpoint, and compares everything with its manifest.
+fn read(run: &Path, number: u64) -> anyhow::Result<Stored> {
+    let folder = place(run, number);
+    let content = |path: PathBuf| fs::read(&path).with_context(|| cannot("read", &path));
+    let manifest: Manifest = serde_json::from_slice(&content(folder.join(MANIFEST))?)
+        .with_context(|| cannot("understand", &folder.join(MANIFEST)))?;
+    anyhow::ensure!(
+        manifest.format == FORMAT,
+        "{} has format {}, expected {FORMAT}",
+        folder.join(MANIFEST).display(),
+        manifest.format
+    );
+    let differs = |path: &Path| format!("{} is not what {MANIFEST} says", path.display());
+    let own = |name: &str| {
+        let path = folder.join(name);
+        let content = content(path.clone())?;
+        let same = manifest.files.get(name) == Some(&Fingerprint::of(&content));
+        anyhow::ensure!(same, differs(&path));
+        Ok(content)
+    };
+    let beginning = |name: &str, fingerprint: &Fingerprint| {
+        let path = run.join(name);
+        let begins = fingerprint.begins(&content(path.clone())?);
+        begins.with_context(|| differs(&path))
+    };
+    beginning(CONFIG, &manifest.config)?;
+    Ok(Stored {
+        number,
+        checkpoint: Checkpoint {
+            tensors: own(TENSORS)?,
+            counters: own(COUNTERS)?,
+        },
+        metrics_bytes: beginning(METRICS, &manifest.metrics)?,
+    })
+}
+
+fn place(run: &Path, number: u64) -> PathBuf {
+    run.join(CHECKPOINTS).join(format!("{number:0DIGITS$}"))
+}
+
+fn parent(place: &Path) -> PathBuf {
+    place.parent().map_or_else(PathBuf::new, Path::to_owned)
+}
+
+/// The numbers of all checkpoints, in order.
+fn numbers(run: &Path) -> anyhow::Result<Vec<u64>> {
+    let names = names(run)?;
+    let whole = names.iter().filter(|name| name.len() == DIGITS);
+    let mut numbers: Vec<u64> = whole.filter_map(|name| name.parse().ok()).collect();
+    numbers.sort_unstable();
+    Ok(numbers)
+}
+
+/// What lies among the checkpoints.
+fn names(run: &Path) -> anyhow::Result<Vec<String>> {
+    let folder = run.join(CHECKPOINTS);
+    let entries = match fs::read_dir(&folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        entries => entries.with_context(|| cannot("read", &folder))?,
+    };
+    entries
+        .map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()))
+        .collect::<io::Result<_>>()
+        .with_context(|| cannot("read", &folder))
+}

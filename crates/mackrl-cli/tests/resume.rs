@@ -1,0 +1,144 @@
+//! An interrupted run goes on as if it had never stopped.
+#![cfg(unix)]
+
+mod support;
+
+use std::{
+    fs,
+    path::Path,
+    process::{Child, Command},
+    time::{Duration, Instant},
+};
+
+use support::{
+    checkpoints, exits, has_unfinished_checkpoint, mackrl, outcome, resume, told, train,
+    uninterrupted, wait_until,
+};
+
+/// Settings with which one update takes seconds.
+const SLOW: &[&str] = &["policy.hidden=128", "learner.environments=128"];
+
+fn send(signal: &str, child: &Child) {
+    let sent = Command::new("kill")
+        .args(["-s", signal, &child.id().to_string()])
+        .status();
+    assert!(sent.expect("`kill` can be run").success(), "{signal}");
+}
+
+/// Sends a signal when `count` checkpoints were written, and expects an orderly stop.
+fn stop(mut command: Command, run: &Path, signal: &str, count: usize) {
+    let before = checkpoints(run).pop();
+    let mut child = command.spawn().expect("the program starts");
+    let mut seen = Vec::from_iter(before);
+    let running = wait_until(&mut child, || {
+        let latest = checkpoints(run)
+            .pop()
+            .filter(|path| path.extension().is_none());
+        seen.extend(latest);
+        seen.dedup();
+        seen.len() > count
+    });
+    assert!(running, "the run ended before {signal}");
+    send(signal, &child);
+    let asked = Instant::now();
+    let output = child.wait_with_output().expect("a child ends");
+    assert!(asked.elapsed() < Duration::from_secs(5), "{signal}");
+    let stderr = told(&output, 75);
+    assert!(
+        stderr.contains("hint: go on with `mackrl resume "),
+        "{stderr}"
+    );
+    assert!(!has_unfinished_checkpoint(run), "{signal}");
+}
+
+#[test]
+fn a_run_that_is_stopped_by_signals_ends_with_the_same_bytes() {
+    let expected = uninterrupted();
+    let parent = tempfile::tempdir().expect("a folder for the run");
+    let run = parent.path().join("run");
+    stop(train(&run, &[]), &run, "TERM", 2);
+    stop(resume(&run, 2), &run, "INT", 5);
+    stop(resume(&run, 3), &run, "USR1", 3);
+    exits(resume(&run, 1), 0);
+    assert!(outcome(&run) == expected);
+    exits(resume(&run, 1), 0);
+    assert!(outcome(&run) == expected, "a finished run stays as it is");
+}
+
+#[test]
+fn a_second_interrupt_stops_at_once() {
+    let parent = tempfile::tempdir().expect("a folder for the run");
+    let run = parent.path().join("run");
+    let mut child = train(&run, SLOW).spawn().expect("the program starts");
+    let metrics = run.join("metrics.jsonl");
+    // After the first test come updates, each of which lasts longer than this test waits.
+    assert!(wait_until(&mut child, || fs::metadata(&metrics)
+        .is_ok_and(|metadata| metadata.len() > 0)));
+    send("INT", &child);
+    std::thread::sleep(Duration::from_millis(50));
+    send("INT", &child);
+    let output = child.wait_with_output().expect("a child ends");
+    told(&output, 130);
+}
+
+#[test]
+fn a_folder_has_one_writer_and_an_unfinished_run_is_resumed_not_overwritten() {
+    let parent = tempfile::tempdir().expect("a folder for the run");
+    let run = parent.path().join("run");
+    let mut child = train(&run, SLOW).spawn().expect("the program starts");
+    assert!(wait_until(&mut child, || run
+        .join("metrics.jsonl")
+        .exists()));
+    let stderr = exits(resume(&run, 1), 2);
+    assert!(
+        stderr.starts_with("error: another process is writing in "),
+        "{stderr}"
+    );
+    child.kill().expect("a child can be killed");
+    child.wait().expect("a child ends");
+    let config = fs::read(run.join("config.toml")).expect("a configuration");
+    let stderr = exits(train(&run, &[]), 2);
+    assert!(
+        stderr.contains("already holds an unfinished run"),
+        "{stderr}"
+    );
+    let hint = format!("hint: go on with `mackrl resume {}`", run.display());
+    assert!(stderr.contains(&hint), "{stderr}");
+    assert_eq!(
+        fs::read(run.join("config.toml")).expect("it is still there"),
+        config
+    );
+}
+
+#[test]
+fn a_damaged_checkpoint_is_noticed_and_an_earlier_one_used() {
+    let expected = uninterrupted();
+    let parent = tempfile::tempdir().expect("a folder for the run");
+    let run = parent.path().join("run");
+    stop(train(&run, &[]), &run, "TERM", 3);
+    let evaluation = exits(
+        mackrl(&["evaluate", "--episodes", "1", &run.to_string_lossy()]),
+        0,
+    );
+    assert_eq!(evaluation, "", "an unfinished run can be evaluated");
+    let flip = |path: &Path| {
+        let path = path.join("tensors.safetensors");
+        let mut tensors = fs::read(&path).expect("a checkpoint has tensors");
+        let last = tensors.len() - 1;
+        tensors[last] ^= 1;
+        fs::write(&path, tensors).expect("a checkpoint can be damaged");
+    };
+    let all = checkpoints(&run);
+    assert_eq!(all.len(), 2, "two checkpoints are kept");
+    flip(&all[1]);
+    let stderr = exits(resume(&run, 1), 0);
+    assert!(stderr.starts_with("warning: "), "{stderr}");
+    assert!(
+        stderr.contains("is not what manifest.json says; an earlier one is used"),
+        "{stderr}"
+    );
+    assert!(outcome(&run) == expected);
+    checkpoints(&run).iter().for_each(|path| flip(path));
+    let stderr = exits(resume(&run, 1), 65);
+    assert!(stderr.contains("is damaged"), "{stderr}");
+}

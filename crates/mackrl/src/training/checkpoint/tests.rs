@@ -1,0 +1,130 @@
+use super::*;
+use crate::{
+    config::{Algorithm, Config},
+    training::{MetricRow, Trainer},
+};
+
+fn config(algorithm: Algorithm) -> Config {
+    let mut config = Config::default();
+    config.policy.algorithm = algorithm;
+    config.policy.hidden = 5;
+    config.learner.environments = 7;
+    config.learner.target_interval_updates = 13;
+    config.exploration.steps_env = 1_009;
+    config.test.interval_steps_env = 701;
+    config.test.episodes = 3;
+    config.run.metrics_interval_steps_env = 307;
+    config.run.steps_env = 2_003;
+    config
+}
+
+/// Rows as bytes, without what depends on the clock.
+fn bytes(row: &MetricRow) -> String {
+    let timeless = row.iter().filter(|(name, _)| !name.starts_with("sys/"));
+    timeless
+        .map(|(name, value)| format!("{name}={:x} ", value.to_bits()))
+        .collect()
+}
+
+/// Trains to the end on `threads[0]`, or on each of `threads` in turn, with an interruption after every `pause` iterations.
+fn train(config: &Config, threads: &[usize], pause: u64) -> (Vec<String>, Checkpoint) {
+    let mut rows = Vec::new();
+    let mut trainer = Trainer::new(config, threads[0]).unwrap();
+    let mut turns = threads.iter().cycle().skip(1);
+    while !trainer.finished() {
+        rows.extend(trainer.update().unwrap().as_ref().map(bytes));
+        if trainer.iterations().is_multiple_of(pause) {
+            let checkpoint = trainer.checkpoint();
+            trainer = Trainer::new(config, *turns.next().unwrap()).unwrap();
+            trainer.restore(&checkpoint).unwrap();
+            assert_eq!(trainer.checkpoint(), checkpoint, "there and back");
+        }
+    }
+    (rows, trainer.checkpoint())
+}
+
+#[test]
+fn an_interrupted_run_equals_an_uninterrupted_one_on_any_number_of_threads() {
+    for algorithm in [Algorithm::Mackrl, Algorithm::CentralV] {
+        let config = config(algorithm);
+        let whole = train(&config, &[1], u64::MAX);
+        assert!(whole.0.len() > 5, "tests and rows: {}", whole.0.len());
+        for (threads, pause) in [([1, 1], 1), ([2, 1], 2), ([1, 3], 3)] {
+            assert!(
+                train(&config, &threads, pause) == whole,
+                "{algorithm:?} on {threads:?} threads, interrupted every {pause} iterations"
+            );
+        }
+    }
+}
+
+#[test]
+fn rmsprop_resumes_as_well() {
+    let mut config = config(Algorithm::CentralV);
+    config.learner.optimiser = crate::config::OptimiserKind::Rmsprop;
+    assert!(train(&config, &[1], 2) == train(&config, &[1], u64::MAX));
+}
+
+fn trained() -> (Trainer, Checkpoint) {
+    let mut trainer = Trainer::new(&config(Algorithm::CentralV), 1).unwrap();
+    for _ in 0..2 {
+        trainer.update().unwrap();
+    }
+    let checkpoint = trainer.checkpoint();
+    (trainer, checkpoint)
+}
+
+#[test]
+fn a_cut_checkpoint_is_refused_and_changes_nothing() {
+    let (mut trainer, checkpoint) = trained();
+    // The last byte of the counters is a line break, which nothing needs.
+    for cut in [0, 1, 7, 100, checkpoint.counters.len() - 2] {
+        let mut damaged = checkpoint.clone();
+        damaged.counters.truncate(cut);
+        assert!(trainer.restore(&damaged).is_err(), "counters cut at {cut}");
+    }
+    for cut in [0, 8, 100, checkpoint.tensors.len() - 1] {
+        let mut damaged = checkpoint.clone();
+        damaged.tensors.truncate(cut);
+        assert!(trainer.restore(&damaged).is_err(), "tensors cut at {cut}");
+    }
+    assert!(trainer.checkpoint() == checkpoint, "nothing has changed");
+}
+
+#[test]
+fn counters_that_no_run_can_have_are_refused_by_name() {
+    let (mut trainer, checkpoint) = trained();
+    let text = String::from_utf8(checkpoint.counters.clone()).unwrap();
+    let mut message = |from: &str, to: &str| {
+        assert!(text.contains(from), "{text}");
+        let counters = text.replace(from, to).into_bytes();
+        let tensors = checkpoint.tensors.clone();
+        let damaged = Checkpoint { tensors, counters };
+        trainer.restore(&damaged).unwrap_err().to_string()
+    };
+    assert_eq!(
+        message("\"format\": 1", "\"format\": 2"),
+        "checkpoint has format 2, expected 1"
+    );
+    let found = message("\"tests\": 1", "\"tests\": 18446744073709551615");
+    assert!(found.contains("as `tests`, expected at most"), "{found}");
+    let found = message("\"critic_loss\"", "\"critic_lost\"");
+    assert!(found.contains("unknown metric `critic_lost`"), "{found}");
+    let found = message("\"episodes\"", "\"episode\"");
+    assert!(found.contains("unknown field `episode`"), "{found}");
+}
+
+#[test]
+fn a_checkpoint_of_another_configuration_is_refused() {
+    let (_, checkpoint) = trained();
+    let mut wider = config(Algorithm::CentralV);
+    wider.policy.hidden = 7;
+    let error = Trainer::new(&wider, 1).unwrap().restore(&checkpoint);
+    let error = error.unwrap_err().to_string();
+    assert!(error.contains("expected F32 of shape"), "{error}");
+    let mut other = config(Algorithm::CentralV);
+    other.learner.optimiser = crate::config::OptimiserKind::Rmsprop;
+    let error = Trainer::new(&other, 1).unwrap().restore(&checkpoint);
+    let error = error.unwrap_err().to_string();
+    assert!(error.contains("no tensor `opt.rmsprop.v."), "{error}");
+}
