@@ -7,7 +7,7 @@ use mackrl_env::{Action, AgentId, Draw, Environment, EpisodeKey, Observations, S
 use serde::Serialize;
 
 use crate::{
-    args::{BenchArgs, BenchCommand, BenchEnvironmentArgs},
+    args::{BenchArgs, BenchCommand, BenchEnvironmentArgs, with_scenario},
     output,
 };
 
@@ -32,9 +32,8 @@ pub(crate) fn run(args: &BenchArgs) -> anyhow::Result<()> {
 
 fn environment(args: &BenchEnvironmentArgs) -> anyhow::Result<()> {
     let typed = format!("--map {}", args.map);
-    let config = ConfigBuilder::new()
-        .flag(&typed, &format!("env.map={}", args.map))?
-        .build()?;
+    let layers = ConfigBuilder::new().flag(&typed, &format!("env.map={}", args.map))?;
+    let config = with_scenario(layers)?.build()?;
     let speed = measure(config.env.make()?, args.steps.get())?;
     if args.json {
         return output::print_json(&speed);

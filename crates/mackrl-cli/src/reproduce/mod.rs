@@ -1,6 +1,6 @@
 //! One command for each figure of the paper.
 
 pub(crate) mod figure5;
-mod meter;
+pub(crate) mod meter;
 
 pub(crate) use meter::Meter;

@@ -76,6 +76,11 @@ impl Terrain {
                 walkable[y * MAP_SIZE + x_first..=y * MAP_SIZE + x_last].fill(true);
             }
         }
+        Self::from_cells(walkable, rectangles.len() > 1)
+    }
+
+    /// The terrain with the given walkable cells, index `y * MAP_SIZE + x`; with `corners`, units find ways round them.
+    pub(crate) fn from_cells(walkable: Vec<bool>, corners: bool) -> Self {
         let mut terrain = Self {
             walkable,
             is_far_from_walls: Vec::new(),
@@ -87,7 +92,7 @@ impl Terrain {
                 (-1..=1).all(|dy| (-1..=1).all(|dx| terrain.is_walkable(x + dx, y + dy)))
             })
             .collect();
-        if rectangles.len() > 1 {
+        if corners {
             terrain.paths = Some(Paths::new(&terrain.walkable));
         }
         terrain
