@@ -59,7 +59,7 @@ pub(crate) struct PlayArgs {
           conflicts_with_all = ["record", "map", "policy", "episodes", "seed", "set", "threads"])]
     pub(crate) replay: Option<PathBuf>,
 
-    /// Draw one step of the first episode to this file, and play no other
+    /// Draw one step of the first episode to this file (as an image if it ends in .png), and play no other
     #[arg(long, value_name = "FILE", help_heading = "One episode")]
     pub(crate) svg: Option<PathBuf>,
 

@@ -11,16 +11,22 @@ use super::{
     svg, text,
 };
 
-/// Pixels of a map unit.
-const UNIT: f64 = 26.0;
+/// Width in pixels that the arena is fitted to.
+const WIDTH: f64 = 840.0;
+/// Least and greatest pixels of a map unit.
+const UNIT: [f64; 2] = [24.0, 52.0];
 /// Pixels between the arena and the edge of the picture.
 const MARGIN: f64 = 16.0;
 /// Pixels above the arena, for the title.
 const HEAD: f64 = 58.0;
 /// Pixels of a row of the legend.
 const LEGEND_ROW: f64 = 22.0;
-/// Map units around the walkable cells that are shown too.
-const SURROUNDINGS: usize = 1;
+/// Cells around the units that are shown too.
+const SURROUNDINGS: f64 = 3.0;
+/// Least cells shown along x and along y.
+const WINDOW_MIN: [usize; 2] = [18, 12];
+/// Opacity where all allies see.
+const SIGHT_OPACITY: f64 = 0.22;
 
 const GROUND: Colour = Colour(0xF4, 0xF1, 0xEA);
 const GRID: Colour = Colour(0xE6, 0xE1, 0xD6);
@@ -106,7 +112,9 @@ impl BattlePicture {
     }
 
     /// The picture as a PNG image.
-    #[cfg(test)]
+    ///
+    /// # Errors
+    /// If the image cannot be encoded.
     pub(crate) fn to_png(&self) -> anyhow::Result<Vec<u8>> {
         super::png::write(&Drawing::new(self).scene())
     }
@@ -117,20 +125,25 @@ struct Drawing<'a> {
     picture: &'a BattlePicture,
     /// First and last cell shown along x, and along y.
     window: [[usize; 2]; 2],
+    /// Pixels of a map unit.
+    unit: f64,
 }
 
 impl<'a> Drawing<'a> {
     fn new(picture: &'a BattlePicture) -> Self {
-        let edge = picture.edge;
-        let cells = || (0..picture.walkable.len()).filter(|cell| picture.walkable[*cell]);
         let window = [0, 1].map(|axis| {
-            let place = |cell: usize| if axis == 0 { cell % edge } else { cell / edge };
-            let first = cells().map(place).min().unwrap_or(0);
-            let last = cells().map(place).max().unwrap_or(edge.saturating_sub(1));
-            let last = (last + SURROUNDINGS).min(edge.saturating_sub(1));
-            [first.saturating_sub(SURROUNDINGS), last]
+            let places = || picture.figures.iter().map(|figure| figure.at[axis]);
+            let first = places().fold(f64::INFINITY, f64::min) - SURROUNDINGS;
+            let last = places().fold(f64::NEG_INFINITY, f64::max) + SURROUNDINGS;
+            cells([first, last], WINDOW_MIN[axis], picture.edge)
         });
-        Self { picture, window }
+        let columns = (window[0][1] + 1 - window[0][0]) as f64;
+        let unit = (WIDTH / columns).clamp(UNIT[0], UNIT[1]);
+        Self {
+            picture,
+            window,
+            unit,
+        }
     }
 
     fn scene(&self) -> Scene {
@@ -138,8 +151,8 @@ impl<'a> Drawing<'a> {
         let area = Rectangle {
             left: MARGIN,
             top: HEAD,
-            right: MARGIN + columns * UNIT,
-            bottom: HEAD + rows * UNIT,
+            right: MARGIN + columns * self.unit,
+            bottom: HEAD + rows * self.unit,
         };
         let legend = self.legend(area);
         let rows = legend
@@ -180,8 +193,8 @@ impl<'a> Drawing<'a> {
     fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let [[first_x, _], [_, last_y]] = self.window;
         [
-            MARGIN + (x - first_x as f64) * UNIT,
-            HEAD + (last_y as f64 + 1.0 - y) * UNIT,
+            MARGIN + (x - first_x as f64) * self.unit,
+            HEAD + (last_y as f64 + 1.0 - y) * self.unit,
         ]
     }
 
@@ -232,12 +245,14 @@ impl<'a> Drawing<'a> {
         let figures = &self.picture.figures;
         let mut shapes = Vec::new();
         let living = || figures.iter().filter(|figure| figure.is_alive);
+        let allies = living().filter(|figure| figure.side == Side::Ally).count();
+        let sight = (SIGHT_OPACITY / allies.max(1) as f64).min(0.05);
         for ally in living().filter(|figure| figure.side == Side::Ally) {
-            let circle = circle(self.place(ally.at), self.picture.sight * UNIT, 96);
-            shapes.push(filled(&circle, Side::Ally.colour(), 0.035));
+            let circle = circle(self.place(ally.at), self.picture.sight * self.unit, 96);
+            shapes.push(filled(&circle, Side::Ally.colour(), sight));
         }
         for dead in figures.iter().filter(|figure| !figure.is_alive) {
-            shapes.extend(cross(self.place(dead.at), 0.28 * UNIT));
+            shapes.extend(cross(self.place(dead.at), 0.28 * self.unit));
         }
         for figure in living() {
             shapes.extend(self.trail(figure));
@@ -246,15 +261,22 @@ impl<'a> Drawing<'a> {
             shapes.extend(self.shot(*shot));
         }
         for figure in living() {
-            shapes.extend(body(self.place(figure.at), figure, true));
+            shapes.extend(body(
+                self.place(figure.at),
+                figure,
+                figure.radius * self.unit,
+            ));
         }
         for missile in &self.picture.missiles {
             shapes.push(filled(&circle(self.place(*missile), 3.6, 16), PAPER, 1.0));
             shapes.push(filled(&circle(self.place(*missile), 2.6, 16), INK, 1.0));
         }
-        // Bars last: no body may hide how much life another has.
         for figure in living() {
-            shapes.extend(bars(self.place(figure.at), figure));
+            shapes.extend(bars(
+                self.place(figure.at),
+                figure,
+                figure.radius * self.unit,
+            ));
         }
         shapes
     }
@@ -263,7 +285,7 @@ impl<'a> Drawing<'a> {
     fn trail(&self, figure: &Figure) -> Option<Shape> {
         let [from, to] = [figure.from, figure.at].map(|at| self.place(at));
         let length = (to[0] - from[0]).hypot(to[1] - from[1]);
-        let width = 0.55 * figure.radius * UNIT;
+        let width = 0.55 * figure.radius * self.unit;
         if length < 3.0 {
             return None;
         }
@@ -282,20 +304,20 @@ impl<'a> Drawing<'a> {
         let (attacker, target) = (&figures[shot.from], &figures[shot.to]);
         let [from, to] = [attacker, target].map(|figure| self.place(figure.at));
         let length = (to[0] - from[0]).hypot(to[1] - from[1]);
-        let near = (attacker.radius + target.radius) * UNIT;
+        let near = (attacker.radius + target.radius) * self.unit;
         if length <= near + 1.0 {
             return Vec::new();
         }
         let along = |distance: f64| {
             [0, 1].map(|axis| from[axis] + (to[axis] - from[axis]) * distance / length)
         };
-        let tip = along(length - target.radius * UNIT - 1.0);
+        let tip = along(length - target.radius * self.unit - 1.0);
         let colour = attacker.side.colour();
         let width = if shot.has_fired { 1.8 } else { 1.0 };
-        let tail = along(attacker.radius * UNIT);
+        let tail = along(attacker.radius * self.unit);
         let mut shapes = vec![open(&[tail, tip], colour, width, !shot.has_fired)];
         if shot.has_fired {
-            let back = along(length - target.radius * UNIT - 8.0);
+            let back = along(length - target.radius * self.unit - 8.0);
             let side = [-(to[1] - from[1]), to[0] - from[0]].map(|part| part / length * 3.4);
             let head = [
                 tip,
@@ -319,14 +341,10 @@ impl<'a> Drawing<'a> {
                 Side::Ally => "ally",
                 Side::Enemy => "enemy",
             };
-            let small = Figure {
-                radius: 0.34,
-                ..figure.clone()
-            };
             entries.push((
                 18.0,
                 format!("{kind} ({owner})"),
-                body([9.0, 0.0], &small, true),
+                body([9.0, 0.0], figure, 9.0),
             ));
         }
         let line = |dashed: bool| {
@@ -338,7 +356,7 @@ impl<'a> Drawing<'a> {
         entries.push((
             20.0,
             "life".to_owned(),
-            vec![bar([0.0, -2.5], 20.0, INK, 1.0)],
+            vec![bar([0.0, -2.5], [20.0, 4.0], INK, 1.0)],
         ));
         if self
             .picture
@@ -346,10 +364,16 @@ impl<'a> Drawing<'a> {
             .iter()
             .any(|figure| figure.shield.is_some())
         {
-            let shield = vec![bar([0.0, -2.5], 20.0, Colour::SKY, 1.0)];
+            let shield = vec![bar([0.0, -2.5], [20.0, 4.0], Colour::SKY, 1.0)];
             entries.push((20.0, "shields".to_owned(), shield));
         }
         entries.push((14.0, "fell here".to_owned(), cross([7.0, 0.0], 5.0)));
+        let seen = filled(&circle([8.0, 0.0], 8.0, 40), Side::Ally.colour(), 0.2);
+        entries.push((
+            16.0,
+            "seen by an ally, darker by more".to_owned(),
+            vec![seen],
+        ));
         flow(entries, area)
     }
 }
@@ -378,8 +402,7 @@ fn flow(entries: Vec<(f64, String, Vec<Shape>)>, area: Rectangle) -> Vec<(usize,
 }
 
 /// A disc or a diamond with the letter of its type.
-fn body(at: [f64; 2], figure: &Figure, with_letter: bool) -> Vec<Shape> {
-    let radius = figure.radius * UNIT;
+fn body(at: [f64; 2], figure: &Figure, radius: f64) -> Vec<Shape> {
     let outline = |radius: f64| match figure.side {
         Side::Ally => circle(at, radius, 40),
         // As large as the disc of the same radius.
@@ -389,62 +412,65 @@ fn body(at: [f64; 2], figure: &Figure, with_letter: bool) -> Vec<Shape> {
         filled(&outline(radius + 1.4), PAPER, 1.0),
         filled(&outline(radius), figure.side.colour(), 1.0),
     ];
-    if with_letter {
-        let size = (1.25 * radius).clamp(6.0, 18.0);
-        let letter: String = figure
-            .kind
-            .chars()
-            .take(1)
-            .flat_map(char::to_uppercase)
-            .collect();
-        let at = [at[0], at[1] + 0.36 * size];
-        shapes.push(Shape::Words(Words {
-            anchor: Anchor::Middle,
-            ..label(&letter, at, size, Weight::Medium, PAPER)
-        }));
+    let size = (1.05 * radius).clamp(6.0, 22.0);
+    let letters = figure.kind.chars().take(1);
+    let letter: String = letters.flat_map(char::to_uppercase).collect();
+    // In the upper part, because bars stand in the lower.
+    let at = [at[0], at[1] + 0.36 * size - 0.28 * radius];
+    shapes.push(Shape::Words(Words {
+        anchor: Anchor::Middle,
+        ..label(&letter, at, size, Weight::Medium, PAPER)
+    }));
+    shapes
+}
+
+/// Life and below it shields, on the body: bars beside it would lie on its neighbours.
+fn bars(at: [f64; 2], figure: &Figure, radius: f64) -> Vec<Shape> {
+    let (width, height) = (1.5 * radius, (0.2 * radius).max(2.0));
+    let left = at[0] - width / 2.0;
+    let mut top = at[1] + 0.2 * radius;
+    let mut shapes = Vec::new();
+    let life = std::iter::once((figure.life, INK));
+    for (share, colour) in life.chain(figure.shield.map(|share| (share, Colour::SKY))) {
+        shapes.push(bar(
+            [left - 1.0, top - 1.0],
+            [width + 2.0, height + 2.0],
+            PAPER,
+            1.0,
+        ));
+        shapes.push(bar([left, top], [width, height], EMPTY_BAR, 1.0));
+        if share > 0.0 {
+            shapes.push(bar([left, top], [width, height], colour, share.min(1.0)));
+        }
+        top += height + 1.0;
     }
     shapes
 }
 
-/// Shields above life, both above the body.
-fn bars(at: [f64; 2], figure: &Figure) -> Vec<Shape> {
-    const STEP: f64 = 4.5;
-    let width = (2.2 * figure.radius * UNIT).max(14.0);
-    let height = figure.radius
-        * UNIT
-        * if figure.side == Side::Enemy {
-            1.25
-        } else {
-            1.0
-        };
-    let left = at[0] - width / 2.0;
-    let mut top = at[1] - height - 8.0;
-    let mut shapes = Vec::new();
-    let shares = [(figure.life, INK)].into_iter();
-    for (share, colour) in shares.chain(figure.shield.map(|share| (share, Colour::SKY))) {
-        let back = Rectangle {
-            left: left - 0.8,
-            top: top - 0.8,
-            right: left + width + 0.8,
-            bottom: top + 4.3,
-        };
-        shapes.push(filled(&back.corners(), PAPER, 0.9));
-        shapes.push(bar([left, top], width, EMPTY_BAR, 1.0));
-        if share > 0.0 {
-            shapes.push(bar([left, top], width, colour, share.min(1.0)));
-        }
-        top -= STEP;
+/// The `length` cells or more between two places, as far as there are so many, as first and last.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "clamped to the map"
+)]
+fn cells([first, last]: [f64; 2], length_min: usize, edge: usize) -> [usize; 2] {
+    let greatest = edge.saturating_sub(1);
+    let cell = |place: f64| place.floor().clamp(0.0, greatest as f64) as usize;
+    let (mut first, mut last) = (cell(first), cell(last));
+    while last + 1 - first < length_min.min(edge) {
+        first = first.saturating_sub(1);
+        last = (last + 1).min(greatest);
     }
-    shapes
+    [first, last]
 }
 
 /// A bar of which `share` is filled.
-fn bar([left, top]: [f64; 2], width: f64, colour: Colour, share: f64) -> Shape {
+fn bar([left, top]: [f64; 2], [width, height]: [f64; 2], colour: Colour, share: f64) -> Shape {
     let rectangle = Rectangle {
         left,
         top,
         right: left + width * share,
-        bottom: top + 3.5,
+        bottom: top + height,
     };
     filled(&rectangle.corners(), colour, 1.0)
 }
@@ -587,11 +613,16 @@ mod tests {
     }
 
     #[test]
-    fn only_the_window_around_the_ground_is_drawn() {
+    fn the_window_is_as_large_as_asked_and_inside_the_map() {
         let scene = Drawing::new(&picture(1.0)).scene();
-        let [columns, rows] = [8.0, 6.0];
         let area = scene.plot_area;
-        assert_eq!(area.right - area.left, columns * UNIT);
-        assert_eq!(area.bottom - area.top, rows * UNIT);
+        let unit = UNIT[1];
+        assert_eq!(
+            area.right - area.left,
+            8.0 * unit,
+            "the map is 8 cells wide"
+        );
+        assert_eq!(cells([10.5, 12.5], 8, 32), [7, 15]);
+        assert_eq!(cells([-1.0, 2.0], 8, 32), [0, 7]);
     }
 }

@@ -160,7 +160,7 @@ impl fmt::Display for Summary {
         write!(
             formatter,
             "{map} by {policy}, {outcome} after {ep_length} steps, return {total:.2}, \
-             {dead_allies} allies and {dead_enemies} enemies lost, state {state_hash}"
+             allies lost: {dead_allies}, enemies lost: {dead_enemies}, state {state_hash}"
         )
     }
 }

@@ -114,7 +114,13 @@ fn one(args: &PlayArgs, episode: &Episode, verb: &str) -> anyhow::Result<()> {
             return Err(Failure::Usage { message }.into());
         }
         let picture = view::picture(episode, step);
-        write(file, picture.to_svg().as_bytes())?;
+        let is_image = file.extension().is_some_and(|name| name == "png");
+        let content = if is_image {
+            picture.to_png()?
+        } else {
+            picture.to_svg().into_bytes()
+        };
+        write(file, &content)?;
     }
     let summary = episode.summary();
     if args.json {
