@@ -222,7 +222,10 @@ fn a_broken_scenario_names_file_line_and_column() {
     let folder = folder_with_example();
     spoil(&folder, "my.toml", "count = 8", "count = 800");
     let check = type_in_folder("maps --check my.toml", folder.path()).fails(64);
-    insta::assert_snapshot!(check, @"");
+    insta::assert_snapshot!(check, @r"
+    error: my.toml:58:32: count is 800, expected an integer in [1, 100]
+    hint: examples/scenarios/sniper-alley.toml explains every line of a scenario
+    ");
     let play = type_in_folder("play --map my.toml", folder.path()).fails(64);
     assert_eq!(check, play);
 }
@@ -249,7 +252,7 @@ fn a_recorded_episode_plays_again_and_a_changed_one_is_found_out() {
         "{error}"
     );
     spoil(&folder, "one.json", "\"version\":1", "\"version\":7");
-    insta::assert_snapshot!(story("play --replay one.json").fails(65), @"");
+    insta::assert_snapshot!(story("play --replay one.json").fails(65), @r#"error: one.json: format "mackrl-recording" version 7, expected "mackrl-recording" version 1"#);
     std::fs::write(folder.path().join("one.json"), "[".repeat(10_000)).expect("writable");
     let error = story("play --replay one.json").fails(65);
     assert!(error.contains("no recording of mackrl"), "{error}");

@@ -39,7 +39,7 @@ pub(crate) struct PlayArgs {
     #[arg(long, value_name = "S", default_value = "1")]
     pub(crate) seed: u64,
 
-    /// One setting of the game, such as env.sight_range=7; repeatable
+    /// One setting of the game, such as `env.sight_range=7`; repeatable
     #[arg(long, value_name = "KEY=VALUE")]
     pub(crate) set: Vec<String>,
 
