@@ -30,6 +30,10 @@ pub(crate) enum Failure {
     BadData { message: String },
     /// A team that does not run decentralised.
     CertificateFailed { mismatches: u64 },
+    /// Flags that do not go together.
+    Usage { message: String },
+    /// A recorded episode that does not play as it did.
+    ReplayDiffers { message: String },
 }
 
 impl fmt::Display for Failure {
@@ -60,7 +64,9 @@ impl fmt::Display for Failure {
                 "{} is not a run folder: it has no config.toml",
                 folder.display()
             ),
-            Self::BadData { message } => formatter.write_str(message),
+            Self::BadData { message }
+            | Self::Usage { message }
+            | Self::ReplayDiffers { message } => formatter.write_str(message),
             Self::CertificateFailed { mismatches } => write!(
                 formatter,
                 "not decentralised: {mismatches} actions differ from the central run"
@@ -122,9 +128,10 @@ fn exit_of(cause: &(dyn std::error::Error + 'static)) -> Option<Exit> {
             Failure::FolderInUse { .. }
             | Failure::UnfinishedRun { .. }
             | Failure::FolderLocked { .. }
-            | Failure::NotARun { .. } => Exit::Usage,
+            | Failure::NotARun { .. }
+            | Failure::Usage { .. } => Exit::Usage,
             Failure::Interrupted { .. } => Exit::Interrupted,
-            Failure::BadData { .. } => Exit::Data,
+            Failure::BadData { .. } | Failure::ReplayDiffers { .. } => Exit::Data,
             Failure::CertificateFailed { .. } => Exit::CertificateFailed,
         });
     }
@@ -162,11 +169,17 @@ fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
                 "give the folder that `mackrl train` wrote, such as runs/3m-mackrl-seed1"
                     .to_owned(),
             ),
+            Failure::ReplayDiffers { .. } => Some(
+                "a replay plays the same only in the version of mackrl that recorded it".to_owned(),
+            ),
             _ => None,
         };
     }
     match cause.downcast_ref::<ConfigError>()? {
         ConfigError::UnknownMap { .. } => Some("`mackrl maps` lists every map".to_owned()),
+        ConfigError::Scenario { .. } => Some(
+            "examples/scenarios/sniper-alley.toml explains every line of a scenario".to_owned(),
+        ),
         ConfigError::UnknownKey { .. } => {
             Some("`mackrl config --print` lists every setting".to_owned())
         }

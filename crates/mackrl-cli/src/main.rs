@@ -5,6 +5,7 @@
 //! `progress` what a person sees while waiting, `signals` how a person stops waiting, `failure` the one place that turns errors into exit codes. Data go to stdout, everything else to stderr.
 
 mod args;
+mod bounded;
 mod commands;
 mod failure;
 mod output;
@@ -29,6 +30,7 @@ fn main() -> ExitCode {
         Command::Certify(args) => commands::certify::run(&args),
         Command::ExecuteAgent(args) => commands::execute_agent::run(&args),
         Command::Reproduce(args) => commands::reproduce::run(&args),
+        Command::Play(args) => commands::play::run(&args),
         Command::Maps(args) => commands::maps::run(&args),
         Command::Config(args) => commands::config::run(&args),
         Command::Bench(args) => commands::bench::run(&args),

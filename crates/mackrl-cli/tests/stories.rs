@@ -59,6 +59,7 @@ fn help_teaches_every_command() {
         "reproduce figure5",
         "reproduce figure6",
         "reproduce figure7",
+        "play",
         "maps",
         "config",
         "bench",
@@ -211,4 +212,108 @@ fn maps_are_listed_as_a_table_and_as_json() {
         let name = map["name"].as_str().expect("a map has a name");
         assert!(table.contains(name), "{name} is missing in the table");
     }
+}
+
+/// A copy of the commented example in a folder of its own.
+fn folder_with_example() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder for the story");
+    let example = include_str!("../../../examples/scenarios/sniper-alley.toml");
+    std::fs::write(folder.path().join("my.toml"), example).expect("the folder can be written");
+    folder
+}
+
+fn spoil(folder: &tempfile::TempDir, file: &str, from: &str, to: &str) {
+    let path = folder.path().join(file);
+    let text = std::fs::read_to_string(&path).expect("the file is there");
+    assert!(text.contains(from), "{file} has no `{from}`");
+    std::fs::write(&path, text.replacen(from, to, 1)).expect("the folder can be written");
+}
+
+#[test]
+fn scripted_teams_play_to_the_same_numbers_on_any_number_of_threads() {
+    let play = |threads: u32| {
+        let line =
+            format!("play --map 3m --policy all --episodes 20 --seed 3 --json --threads {threads}");
+        type_in(&line).succeeds()
+    };
+    let rows: Vec<serde_json::Value> = serde_json::from_str(&play(1)).expect("a JSON array");
+    assert_eq!(rows.len(), 5, "one row for each policy");
+    assert_eq!(play(1), play(3));
+    for key in [
+        "battle_won",
+        "return",
+        "ep_length",
+        "dead_allies",
+        "dead_enemies",
+    ] {
+        for suffix in ["mean", "sem"] {
+            let key = format!("{key}_{suffix}");
+            assert!(rows[0][&key].is_number(), "{key} is missing");
+        }
+    }
+}
+
+#[test]
+fn a_scenario_of_ones_own_is_checked_played_and_trained_on() {
+    let folder = folder_with_example();
+    let story = |line: &str| type_in_folder(line, folder.path());
+    insta::assert_snapshot!(story("maps --check my.toml").succeeds(), @r"
+    name  n_agents  n_enemies  n_actions  obs_size  state_size  episode_limit
+    my           3          8         14        55          78            150
+    ");
+    story("play --map ./my.toml --episodes 3 --policy kite").succeeds();
+    story("train --map ./my.toml --steps 100 --set test.episodes=2 --seed 2").succeeds();
+    // The run holds all that it depends on.
+    std::fs::remove_file(folder.path().join("my.toml")).expect("the file is there");
+    story("evaluate runs/my-mackrl-seed2 --episodes 2").succeeds();
+}
+
+#[test]
+fn a_broken_scenario_names_file_line_and_column() {
+    let folder = folder_with_example();
+    spoil(&folder, "my.toml", "count = 8", "count = 800");
+    let check = type_in_folder("maps --check my.toml", folder.path()).fails(64);
+    insta::assert_snapshot!(check, @r"
+    error: my.toml:58:32: count is 800, expected an integer in [1, 100]
+    hint: examples/scenarios/sniper-alley.toml explains every line of a scenario
+    ");
+    let play = type_in_folder("play --map my.toml", folder.path()).fails(64);
+    assert_eq!(check, play);
+}
+
+#[test]
+fn a_recorded_episode_plays_again_and_a_changed_one_is_found_out() {
+    let folder = tempfile::tempdir().expect("a folder for the story");
+    let story = |line: &str| type_in_folder(line, folder.path());
+    let played = story("play --map 2s3z --record one.json --svg one.svg").succeeds();
+    let replayed = story("play --replay one.json --svg two.svg").succeeds();
+    let end = |text: &str| {
+        text.split_once(": ")
+            .expect("a verb and a summary")
+            .1
+            .to_owned()
+    };
+    assert_eq!(end(&played), end(&replayed));
+    let read = |name: &str| std::fs::read(folder.path().join(name)).expect("a picture");
+    assert_eq!(read("one.svg"), read("two.svg"));
+    spoil(&folder, "one.json", "\"seed\":1", "\"seed\":2");
+    let error = story("play --replay one.json").fails(65);
+    assert!(
+        error.contains("the replay first differs after step"),
+        "{error}"
+    );
+    spoil(&folder, "one.json", "\"version\":1", "\"version\":7");
+    insta::assert_snapshot!(story("play --replay one.json").fails(65), @r#"error: one.json: format "mackrl-recording" version 7, expected "mackrl-recording" version 1"#);
+    std::fs::write(folder.path().join("one.json"), "[".repeat(10_000)).expect("writable");
+    let error = story("play --replay one.json").fails(65);
+    assert!(error.contains("no recording of mackrl"), "{error}");
+}
+
+#[test]
+fn a_step_after_the_end_is_a_usage_error() {
+    let error = type_in("play --map 3m --svg a.svg --step 999").fails(2);
+    assert!(
+        error.starts_with("error: --step 999 is after the end"),
+        "{error}"
+    );
 }

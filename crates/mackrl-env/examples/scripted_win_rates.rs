@@ -4,7 +4,10 @@
 use mackrl_env::{
     Action, Environment, EpisodeKey, Observations, Stream,
     registry::{self, MakeError},
-    skirmish::{SkirmishSettings, scripted::ScriptedPolicy},
+    skirmish::{
+        Skirmish, SkirmishSettings,
+        scripted::{ScriptedPolicy, ScriptedTeam},
+    },
 };
 
 fn main() -> Result<(), MakeError> {
@@ -13,11 +16,10 @@ fn main() -> Result<(), MakeError> {
         "{:>14} {:>12} {:>6} {:>7} {:>7}",
         "map", "policy", "wins", "return", "length"
     );
-    let skirmishes = registry::names().into_iter();
-    for name in skirmishes.filter(|&name| name != registry::MATRIX_GAME) {
-        let mut environment = registry::make(name, &SkirmishSettings::default())?;
+    for name in registry::map_names() {
+        let mut environment = registry::make_skirmish(name, &SkirmishSettings::default())?;
         for policy in ScriptedPolicy::ALL {
-            let [wins, total, steps] = play(environment.as_mut(), policy, episodes);
+            let [wins, total, steps] = play(&mut environment, policy, episodes);
             let policy = format!("{policy:?}");
             println!("{name:>14} {policy:>12} {wins:6.2} {total:7.2} {steps:7.1}");
         }
@@ -26,9 +28,9 @@ fn main() -> Result<(), MakeError> {
 }
 
 /// Mean wins, return and length.
-fn play(environment: &mut dyn Environment, policy: ScriptedPolicy, episodes: u64) -> [f64; 3] {
+fn play(environment: &mut Skirmish, policy: ScriptedPolicy, episodes: u64) -> [f64; 3] {
     let spec = environment.spec().clone();
-    let prior = environment.prior_knowledge();
+    let mut team = ScriptedTeam::new(policy, environment);
     let mut observations = Observations::new(&spec, 1);
     let mut actions = vec![Action::default(); spec.agents];
     let mut sums = [0.0; 3];
@@ -36,14 +38,7 @@ fn play(environment: &mut dyn Environment, policy: ScriptedPolicy, episodes: u64
         let key = EpisodeKey::new(1, Stream::Other, episode);
         environment.reset(key, &mut observations.row_mut(0));
         for step in 0.. {
-            policy.act(
-                &spec,
-                prior.as_ref(),
-                &observations,
-                0,
-                (key, step),
-                &mut actions,
-            );
+            team.act(&observations, 0, (key, step), &mut actions);
             let time_step = environment
                 .step(&actions, &mut observations.row_mut(0))
                 .expect("scripted policies choose available actions");

@@ -1,6 +1,6 @@
 //! Every environment by its name.
 
-use std::sync::Arc;
+use std::{ffi::OsStr, path::Path, sync::Arc};
 
 use thiserror::Error;
 
@@ -8,7 +8,8 @@ use crate::{
     Environment, EnvironmentSpec,
     matrix_game::{InvalidProbability, MatrixGame, MatrixGameSettings},
     skirmish::{
-        Scenario, Skirmish, SkirmishError, SkirmishSettings, scenario, unit_types::UnitTypes,
+        Scenario, Skirmish, SkirmishError, SkirmishSettings, custom, scenario,
+        unit_types::UnitTypes,
     },
 };
 
@@ -79,6 +80,26 @@ pub fn make_skirmish(name: &str, settings: &SkirmishSettings) -> Result<Skirmish
         name: name.to_owned(),
         nearest: nearest_name(name),
     })??;
+    Ok(Skirmish::new(Arc::new(scenario), settings.clone())?)
+}
+
+/// Builds the skirmish of the scenario `text` that a user wrote; `file` is what errors call it, and its stem names the world.
+///
+/// # Errors
+/// [`SkirmishError::Scenario`] with line and column, or what is wrong with the settings.
+pub fn make_custom(
+    file: &str,
+    text: &str,
+    settings: &SkirmishSettings,
+) -> Result<Skirmish, MakeError> {
+    let units = UnitTypes::load(settings.units)?;
+    let stem = Path::new(file).file_stem().and_then(OsStr::to_str);
+    let scenario = custom::parse(stem.unwrap_or(file), text, &units).map_err(|problem| {
+        SkirmishError::Scenario {
+            file: file.to_owned(),
+            problem,
+        }
+    })?;
     Ok(Skirmish::new(Arc::new(scenario), settings.clone())?)
 }
 

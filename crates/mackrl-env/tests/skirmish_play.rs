@@ -2,7 +2,10 @@
 
 use mackrl_env::{
     Action, Environment, EpisodeEnd, EpisodeKey, Observations, Stream, registry,
-    skirmish::{Compatibility, Skirmish, SkirmishSettings, scripted::ScriptedPolicy},
+    skirmish::{
+        Compatibility, Skirmish, SkirmishSettings,
+        scripted::{ScriptedPolicy, ScriptedTeam},
+    },
 };
 
 /// Plays an episode; `watch` is called after the start and after every step with the reward.
@@ -13,21 +16,14 @@ fn play(
     mut watch: impl FnMut(&Skirmish, &Observations, f32),
 ) -> EpisodeEnd {
     let spec = skirmish.spec().clone();
-    let prior = skirmish.prior_knowledge();
+    let mut team = ScriptedTeam::new(policy, skirmish);
     let mut observations = Observations::new(&spec, 1);
     let mut actions = vec![Action::default(); spec.agents];
     let key = EpisodeKey::new(5, Stream::Other, episode);
     skirmish.reset(key, &mut observations.row_mut(0));
     watch(skirmish, &observations, 0.0);
     for step in 0..spec.episode_limit {
-        policy.act(
-            &spec,
-            prior.as_ref(),
-            &observations,
-            0,
-            (key, step),
-            &mut actions,
-        );
+        team.act(&observations, 0, (key, step), &mut actions);
         let time_step = skirmish
             .step(&actions, &mut observations.row_mut(0))
             .expect("scripted policies choose available actions");
@@ -98,10 +94,8 @@ fn a_won_game_of_3m_returns_20() {
 
 #[test]
 fn nothing_impossible_happens_in_any_step_on_any_map() {
-    for name in registry::names() {
-        let Ok(mut skirmish) = registry::make_skirmish(name, &SkirmishSettings::default()) else {
-            continue;
-        };
+    for name in registry::map_names() {
+        let mut skirmish = registry::make_skirmish(name, &SkirmishSettings::default()).unwrap();
         for (episode, policy) in ScriptedPolicy::ALL.into_iter().enumerate() {
             let mut was_alive = vec![true; skirmish.spec().entities];
             play(&mut skirmish, policy, episode as u64, |skirmish, _, _| {

@@ -4,13 +4,16 @@
 use mackrl::{common_knowledge::common_knowledge, partition::Pairs};
 use mackrl_env::{
     Action, AgentId, EntitySet, Environment, EpisodeKey, Observations, Stream, registry,
-    skirmish::{SkirmishSettings, scripted::ScriptedPolicy},
+    skirmish::{
+        Skirmish, SkirmishSettings,
+        scripted::{ScriptedPolicy, ScriptedTeam},
+    },
 };
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let mut world = registry::make("2s3z", &SkirmishSettings::default())?;
+    let mut world = registry::make_skirmish("2s3z", &SkirmishSettings::default())?;
     let agents = world.spec().agents;
-    let observations = after_some_steps(world.as_mut(), 20)?;
+    let observations = after_some_steps(&mut world, 20)?;
     let visible_n = observations.visible(0);
     println!(
         "2s3z after 20 steps of walking about: entities 0 to 4 are the team, 5 to 9 the enemy.\n"
@@ -45,17 +48,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
 /// What a team that acts at random observes after `steps` steps.
 fn after_some_steps(
-    world: &mut dyn Environment,
+    world: &mut Skirmish,
     steps: usize,
 ) -> Result<Observations, mackrl_env::IllegalAction> {
-    let (spec, prior) = (world.spec().clone(), world.prior_knowledge());
+    let spec = world.spec().clone();
+    let mut team = ScriptedTeam::new(ScriptedPolicy::Random, world);
     let mut observations = Observations::new(&spec, 1);
     let mut actions = vec![Action::default(); spec.agents];
     let key = EpisodeKey::new(1, Stream::Other, 0);
     world.reset(key, &mut observations.row_mut(0));
     for step in 0..steps {
         let at = (key, step);
-        ScriptedPolicy::Random.act(&spec, &*prior, &observations, 0, at, &mut actions);
+        team.act(&observations, 0, at, &mut actions);
         world.step(&actions, &mut observations.row_mut(0))?;
     }
     Ok(observations)

@@ -1,15 +1,39 @@
 //! The flags from which a configuration is put together.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
-use mackrl::config::ConfigBuilder;
+use mackrl::config::{ConfigBuilder, ConfigError};
+use mackrl_env::skirmish::custom::LENGTH_MAX;
+
+use crate::bounded;
+
+/// Lays the text of the scenario file that the map names, if it names one.
+pub(crate) fn with_scenario(builder: ConfigBuilder) -> anyhow::Result<ConfigBuilder> {
+    match builder.missing_scenario() {
+        Some(file) => Ok(builder.scenario(&read_scenario(Path::new(&file))?)),
+        None => Ok(builder),
+    }
+}
+
+/// Reads a scenario file, which may be anything: no more of it than a scenario may have.
+pub(crate) fn read_scenario(path: &Path) -> anyhow::Result<String> {
+    let bytes = bounded::read(path, LENGTH_MAX)?;
+    String::from_utf8(bytes).map_err(|error| {
+        let message = format!(
+            "{}: not UTF-8 text at byte {}",
+            path.display(),
+            error.utf8_error().valid_up_to()
+        );
+        ConfigError::Scenario { message }.into()
+    })
+}
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ConfigurationArgs {
-    /// Map to play, as `mackrl maps` lists it (short for `--set env.map=NAME`)
-    #[arg(long, value_name = "NAME", help_heading = "Configuration")]
+    /// Map to play, as `mackrl maps` lists it, or a scenario file ending in .toml (short for `--set env.map=MAP`)
+    #[arg(long, value_name = "MAP", help_heading = "Configuration")]
     pub(crate) map: Option<String>,
 
     /// What learns: mackrl or central-v (short for `--set policy.algorithm=NAME`)
@@ -60,7 +84,7 @@ impl ConfigurationArgs {
         for assignment in &self.set {
             builder = builder.set(assignment)?;
         }
-        Ok(builder)
+        with_scenario(builder)
     }
 
     fn short_flags(&self) -> [(&'static str, &'static str, Option<String>); 4] {

@@ -2,7 +2,10 @@
 
 mod bench;
 mod configuration;
+mod play;
 mod runs;
+
+use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
@@ -10,7 +13,8 @@ use crate::reproduce::{figure5::Figure5Options, figure6::Figure6Options, figure7
 pub(crate) use bench::{
     BenchArgs, BenchCommand, BenchEnvironmentArgs, BenchTrainArgs, BenchUpdateArgs,
 };
-pub(crate) use configuration::ConfigurationArgs;
+pub(crate) use configuration::{ConfigurationArgs, read_scenario, with_scenario};
+pub(crate) use play::PlayArgs;
 pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, TrainArgs};
 
 /// Teaches teams to coordinate without communicating, by acting jointly on what they commonly know.
@@ -36,6 +40,7 @@ pub(crate) enum Command {
     #[command(hide = true)]
     ExecuteAgent(ExecuteAgentArgs),
     Reproduce(ReproduceArgs),
+    Play(PlayArgs),
     Maps(MapsArgs),
     Config(ConfigArgs),
     Bench(BenchArgs),
@@ -57,14 +62,21 @@ pub(crate) enum Figure {
     Figure7(Figure7Options),
 }
 
-/// List the maps that can be played, with the sizes of their arrays
+/// List the maps that can be played, with the sizes of their arrays, or check a scenario of your own
 ///
-/// Example: mackrl maps --json
+/// A scenario is a TOML file: terrain, units, orders, and unit types of its own if wanted. Every command that takes --map takes
+/// a scenario file in place of a name. examples/scenarios/sniper-alley.toml explains every line of one.
+///
+/// Examples: mackrl maps --json; mackrl maps --check my.toml
 #[derive(Debug, Args)]
 pub(crate) struct MapsArgs {
     /// Print a JSON array instead of a table
     #[arg(long)]
     pub(crate) json: bool,
+
+    /// List this scenario file instead; an error names line and column, what was found and what was expected
+    #[arg(long, value_name = "FILE")]
+    pub(crate) check: Option<PathBuf>,
 }
 
 /// Print the configuration that a run would have, and where each value comes from

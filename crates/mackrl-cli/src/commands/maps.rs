@@ -1,10 +1,16 @@
 //! `mackrl maps`: what can be played.
 
+use std::path::Path;
+
 use anyhow::Context;
-use mackrl_env::{EnvironmentSpec, registry, skirmish::SkirmishSettings};
+use mackrl::config::ConfigError;
+use mackrl_env::{Environment, EnvironmentSpec, registry, skirmish::SkirmishSettings};
 use serde::Serialize;
 
-use crate::{args::MapsArgs, output};
+use crate::{
+    args::{MapsArgs, read_scenario},
+    output,
+};
 
 /// A map as it is listed, with the names that SMAC users know.
 #[derive(Debug, Serialize)]
@@ -37,13 +43,27 @@ impl From<&EnvironmentSpec> for MapRow {
 }
 
 pub(crate) fn run(args: &MapsArgs) -> anyhow::Result<()> {
-    let specs = registry::specs(&SkirmishSettings::default()).context("cannot list the maps")?;
+    let specs = match &args.check {
+        Some(file) => vec![checked(file)?],
+        None => registry::specs(&SkirmishSettings::default()).context("cannot list the maps")?,
+    };
     let rows: Vec<MapRow> = specs.iter().map(MapRow::from).collect();
     if args.json {
         output::print_json(&rows)
     } else {
         output::print(&table(&rows))
     }
+}
+
+/// Sizes of the scenario in `file`, if nothing is wrong with it.
+fn checked(file: &Path) -> anyhow::Result<EnvironmentSpec> {
+    let text = read_scenario(file)?;
+    let name = file.display().to_string();
+    let skirmish = registry::make_custom(&name, &text, &SkirmishSettings::default());
+    let skirmish = skirmish.map_err(|error| ConfigError::Scenario {
+        message: error.to_string(),
+    })?;
+    Ok(skirmish.spec().clone())
 }
 
 fn table(rows: &[MapRow]) -> String {

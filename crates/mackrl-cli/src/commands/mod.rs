@@ -6,6 +6,7 @@ pub(crate) mod config;
 pub(crate) mod evaluate;
 pub(crate) mod execute_agent;
 pub(crate) mod maps;
+pub(crate) mod play;
 pub(crate) mod reproduce;
 pub(crate) mod resume;
 pub(crate) mod train;

@@ -31,7 +31,9 @@ fn default_folder(config: &Config) -> PathBuf {
         .and_then(|name| name.as_str().map(str::to_owned))
         .unwrap_or_default();
     let Config { env, run, .. } = config;
-    Path::new("runs").join(format!("{}-{algorithm}-seed{}", env.map, run.seed))
+    let map = Path::new(&env.map).file_stem().unwrap_or_default();
+    let name = format!("{}-{algorithm}-seed{}", map.display(), run.seed);
+    Path::new("runs").join(name)
 }
 
 #[cfg(test)]

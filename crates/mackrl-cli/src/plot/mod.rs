@@ -1,4 +1,4 @@
-//! Line charts with bands, as SVG and PNG.
+//! Line charts with bands, and pictures of battles, as SVG and PNG.
 //!
 //! A chart is data: titles, axes and series of points. It knows nothing of learners, games or files, so a figure can be
 //! redrawn from what a run has written. [`LineChart`] is laid out once into a scene of polygons, lines, discs and words, and
@@ -8,6 +8,7 @@
 //! The colours are those of Okabe and Ito ("Color Universal Design", 2008), which people with any kind of colour vision can
 //! tell apart; series that matter also differ in line style.
 
+mod battle;
 mod chart;
 mod layout;
 mod png;
@@ -16,6 +17,7 @@ mod scene;
 mod svg;
 mod text;
 
+pub(crate) use battle::{BattlePicture, Figure, Shot, Side};
 pub(crate) use chart::{Axis, Colour, Corner, LineChart, Mark, Point, Series};
 
 #[cfg(test)]

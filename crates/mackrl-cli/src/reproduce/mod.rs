@@ -5,7 +5,7 @@ pub(crate) mod figure5;
 pub(crate) mod figure6;
 pub(crate) mod figure7;
 mod learning;
-mod meter;
+pub(crate) mod meter;
 
 use std::{fs, path::Path};
 

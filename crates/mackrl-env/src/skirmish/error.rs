@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use crate::skirmish::custom::ScenarioProblem;
+
 /// Why a skirmish could not be set up.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
@@ -16,6 +18,14 @@ pub enum SkirmishError {
         map: String,
         /// What was found and what was expected.
         problem: String,
+    },
+    /// A scenario that a user wrote is broken.
+    #[error("{file}:{problem}")]
+    Scenario {
+        /// The file, as the user named it.
+        file: String,
+        /// What is wrong, and where.
+        problem: ScenarioProblem,
     },
     /// A setting has a value outside its range.
     #[error("setting `{key}` is {found}, expected {expected}")]

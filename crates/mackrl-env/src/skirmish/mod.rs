@@ -4,6 +4,7 @@
 //! (Samvelyan and others, "The StarCraft Multi-Agent Challenge", 2019) and adds the local views of [`crate::Environment`].
 //! Unit statistics and maps are data ([`unit_types`], [`scenario`]), read from the files under `units/` and `maps/`.
 
+pub mod custom;
 pub mod error;
 mod face;
 mod paths;

@@ -192,10 +192,16 @@ impl Scenario {
         };
         let file: MapFile = toml::from_str(text).map_err(|error| problem(error.to_string()))?;
         file.validate(units).map_err(problem)?;
-        Self::build(name, &file, units).map_err(problem)
+        Self::build(name, &file, Terrain::named(file.terrain), units).map_err(problem)
     }
 
-    fn build(name: &str, file: &MapFile, units: &UnitTypes) -> Result<Self, String> {
+    /// Looks up types and finds a place for everybody.
+    pub(super) fn build(
+        name: &str,
+        file: &MapFile,
+        terrain: Arc<Terrain>,
+        units: &UnitTypes,
+    ) -> Result<Self, String> {
         let mut names: Vec<&str> = file
             .groups()
             .map(|(_, group)| group.unit.as_str())
@@ -203,7 +209,7 @@ impl Scenario {
         names.sort_unstable();
         names.dedup();
         let types: Vec<&UnitType> = names.iter().filter_map(|name| units.find(name)).collect();
-        let field = Battlefield::new(Terrain::named(file.terrain), units, &types);
+        let field = Battlefield::new(terrain, units, &types);
         let recruits = place_armies(file, &field, &names)?;
         let (mut allies, enemies): (Vec<Recruit>, Vec<Recruit>) = recruits
             .into_iter()
@@ -243,7 +249,7 @@ impl MapFile {
         allies.chain(self.enemies.groups.iter().map(|group| (Team::Enemy, group)))
     }
 
-    fn validate(&self, units: &UnitTypes) -> Result<(), String> {
+    pub(super) fn validate(&self, units: &UnitTypes) -> Result<(), String> {
         if !(1..=100_000).contains(&self.episode_limit) {
             return Err(format!(
                 "episode_limit is {}, expected 1..=100000",

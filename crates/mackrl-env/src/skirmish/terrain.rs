@@ -118,6 +118,11 @@ impl Terrain {
         for rectangle in rectangles {
             fill(&mut walkable, *rectangle, |cell| *cell = true);
         }
+        Self::from_cells(walkable, rectangles.len() > 1)
+    }
+
+    /// The terrain with the given walkable cells, index `y * MAP_SIZE + x`; with `corners`, units find ways round them.
+    pub(crate) fn from_cells(walkable: Vec<bool>, corners: bool) -> Self {
         let mut terrain = Self {
             passable: walkable.clone(),
             level: walkable.iter().map(|cell| u8::from(*cell)).collect(),
@@ -128,7 +133,7 @@ impl Terrain {
             paths: None,
         };
         terrain.survey();
-        if rectangles.len() > 1 {
+        if corners {
             terrain.paths = Some(Paths::new(&terrain.passable));
         }
         terrain

@@ -332,7 +332,7 @@ impl UnitType {
         self.attributes.contains(&attribute)
     }
 
-    fn validate(&self, least_jitter_s: f32) -> Result<(), SkirmishError> {
+    pub(super) fn validate(&self, least_jitter_s: f32) -> Result<(), SkirmishError> {
         let lengths = [self.radius, self.separation_radius, self.inner_radius];
         require(
             is_magnitude(self.life) && self.life > 0.0,

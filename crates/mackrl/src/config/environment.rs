@@ -4,7 +4,7 @@ use mackrl_env::{
     Environment,
     matrix_game::MatrixGameSettings,
     registry::{self, MATRIX_GAME},
-    skirmish::{SkirmishError, SkirmishSettings},
+    skirmish::{Skirmish, SkirmishError, SkirmishSettings},
 };
 use serde::{Deserialize, Serialize};
 
@@ -22,6 +22,9 @@ use crate::{
 pub struct EnvironmentConfig {
     /// Name of the world in the registry, such as `3m`; `mackrl maps` lists them.
     pub map: String,
+    /// Text of a scenario that is played instead of a shipped map; empty for shipped maps. It is stored, not its file's name
+    /// alone, so that a run folder holds all that its result depends on.
+    pub scenario: String,
     /// Settings of skirmishes, written beside the map: `env.move_amount`, `env.sight_range` and so on.
     #[serde(flatten)]
     pub settings: SkirmishSettings,
@@ -33,6 +36,7 @@ impl Default for EnvironmentConfig {
     fn default() -> Self {
         Self {
             map: "3m".to_owned(),
+            scenario: String::new(),
             settings: SkirmishSettings::default(),
             matrix_game: MatrixGameSettings::default(),
         }
@@ -40,23 +44,95 @@ impl Default for EnvironmentConfig {
 }
 
 impl EnvironmentConfig {
-    pub(super) const SETTINGS: &[Setting] = &[Setting {
-        key: "env.map",
-        documentation: "Name of the world in the registry, such as `3m`; `mackrl maps` lists them.",
-        expects: "a name that `mackrl maps` lists",
-    }];
+    pub(super) const SETTINGS: &[Setting] = &[
+        Setting {
+            key: "env.map",
+            documentation: "Name of the world in the registry, such as `3m`, or a scenario file ending in .toml; `mackrl maps` lists them.",
+            expects: "a name that `mackrl maps` lists, or a file ending in .toml",
+        },
+        Setting {
+            key: "env.scenario",
+            documentation: "Text of a scenario that is played instead of a shipped map; filled in from the file that env.map names.",
+            expects: "the text of a scenario file, as `mackrl maps --check` accepts it",
+        },
+    ];
+
+    /// The scenario file whose text has still to be laid into `env.scenario`, if the map is one.
+    #[must_use]
+    pub fn missing_scenario(&self) -> Option<&str> {
+        (self.scenario.is_empty() && self.map.ends_with(".toml")).then_some(self.map.as_str())
+    }
 
     /// Builds the world.
     ///
     /// # Errors
     /// [`Error::Config`] if the map is unknown or a setting is out of its range.
     pub fn make(&self) -> Result<Box<dyn Environment>, Error> {
-        let made = if self.map == MATRIX_GAME {
-            registry::make_matrix_game(self.matrix_game).map(|game| Box::new(game) as _)
+        if self.scenario.is_empty() && self.map == MATRIX_GAME {
+            return registry::make_matrix_game(self.matrix_game)
+                .map(|game| Box::new(game) as _)
+                .map_err(|error| Error::Config(error.to_string()));
+        }
+        Ok(Box::new(self.skirmish()?))
+    }
+
+    /// Builds the world as a skirmish, whose units can be looked at.
+    ///
+    /// # Errors
+    /// As [`EnvironmentConfig::make`], and [`Error::Config`] if the map is the matrix game, which has no units.
+    pub fn skirmish(&self) -> Result<Skirmish, Error> {
+        if self.scenario.is_empty() {
+            registry::make_skirmish(&self.map, &self.settings)
         } else {
-            registry::make(&self.map, &self.settings)
-        };
-        made.map_err(|error| Error::Config(error.to_string()))
+            registry::make_custom(&self.map, &self.scenario, &self.settings)
+        }
+        .map_err(|error| Error::Config(error.to_string()))
+    }
+
+    /// Checks a section that was read on its own.
+    ///
+    /// # Errors
+    /// As [`crate::config::Config::validate`], for this section.
+    pub fn validate(&self) -> Result<(), ConfigError> {
+        self.validate_with(|_| Origin::Unknown)
+    }
+
+    /// Checks the matrix game's settings, whose ranges hold whichever map is played.
+    fn validate_matrix_game(&self, origin_of: &impl Fn(&str) -> Origin) -> Result<(), ConfigError> {
+        let p = self.matrix_game.common_knowledge;
+        if (0.0..=1.0).contains(&p) {
+            return Ok(());
+        }
+        let key = "env.matrix_game.common_knowledge";
+        Err(ConfigError::WrongValue {
+            origin: origin_of(key),
+            key: key.to_owned(),
+            found: p.to_string(),
+            expected: "a number in [0, 1]".to_owned(),
+        })
+    }
+
+    /// Checks the map's name, or the scenario that takes its place.
+    fn validate_map(&self, origin_of: &impl Fn(&str) -> Origin) -> Result<(), ConfigError> {
+        if let Some(file) = self.missing_scenario() {
+            return Err(ConfigError::Scenario {
+                message: format!("the text of {file} is missing, expected it in env.scenario"),
+            });
+        }
+        if self.scenario.is_empty() {
+            let names = registry::names();
+            return if names.contains(&self.map.as_str()) {
+                Ok(())
+            } else {
+                let origin = origin_of("env.map");
+                Err(ConfigError::unknown_map(origin, &self.map, names))
+            };
+        }
+        registry::make_custom(&self.map, &self.scenario, &self.settings)
+            .map(|_| ())
+            .map_err(|error| ConfigError::Scenario {
+                message: error.to_string(),
+            })
     }
 
     /// The dotted keys of the maps' settings.
@@ -75,24 +151,6 @@ impl EnvironmentConfig {
         &self,
         origin_of: impl Fn(&str) -> Origin,
     ) -> Result<(), ConfigError> {
-        let names = registry::names();
-        if !names.contains(&self.map.as_str()) {
-            return Err(ConfigError::unknown_map(
-                origin_of("env.map"),
-                &self.map,
-                names,
-            ));
-        }
-        let p = self.matrix_game.common_knowledge;
-        if !(0.0..=1.0).contains(&p) {
-            let key = "env.matrix_game.common_knowledge";
-            return Err(ConfigError::WrongValue {
-                origin: origin_of(key),
-                key: key.to_owned(),
-                found: p.to_string(),
-                expected: "a number in [0, 1]".to_owned(),
-            });
-        }
         self.settings.validate().map_err(|error| match error {
             SkirmishError::Setting {
                 key,
@@ -108,7 +166,9 @@ impl EnvironmentConfig {
                 origin: origin_of("env.map"),
                 message: other.to_string(),
             },
-        })
+        })?;
+        self.validate_matrix_game(&origin_of)?;
+        self.validate_map(&origin_of)
     }
 }
 

@@ -95,6 +95,12 @@ pub enum ConfigError {
         /// The most similar name, if one is similar at all.
         nearest: Option<String>,
     },
+    /// A scenario that a user wrote is broken.
+    #[error("{message}")]
+    Scenario {
+        /// File, line and column, what was found and what was expected.
+        message: String,
+    },
     /// A preset that is not shipped.
     #[error("unknown preset `{name}`, expected {expected}{}", suggestion(nearest.as_deref()))]
     UnknownPreset {

@@ -7,7 +7,10 @@ use mackrl_env::{IllegalAction, random_play::RandomPlay};
 use serde::Serialize;
 
 use super::print_rows;
-use crate::{args::BenchEnvironmentArgs, output};
+use crate::{
+    args::{BenchEnvironmentArgs, with_scenario},
+    output,
+};
 
 /// Equal parts of which the fastest is reported beside the whole.
 const PARTS: u64 = 5;
@@ -31,9 +34,8 @@ struct Player {
 
 pub(super) fn run(args: &BenchEnvironmentArgs) -> anyhow::Result<()> {
     let typed = format!("--map {}", args.map);
-    let config = ConfigBuilder::new()
-        .flag(&typed, &format!("env.map={}", args.map))?
-        .build()?;
+    let layers = ConfigBuilder::new().flag(&typed, &format!("env.map={}", args.map))?;
+    let config = with_scenario(layers)?.build()?;
     let players = (0..args.threads.get() as u64).map(|seed| {
         Ok(Player {
             play: RandomPlay::new(config.env.make()?, seed),

@@ -117,6 +117,12 @@ impl Skirmish {
         self.tally
     }
 
+    /// How it is played and shown to agents.
+    #[must_use]
+    pub fn settings(&self) -> &SkirmishSettings {
+        &self.settings
+    }
+
     /// A number that differs, but for chance, when two states of the battle differ; the same on every machine.
     #[must_use]
     pub fn state_hash(&self) -> u64 {

@@ -99,6 +99,23 @@ impl ConfigBuilder {
         Ok(self)
     }
 
+    /// The scenario file that the map names and whose text has still to be laid with [`ConfigBuilder::scenario`], if any.
+    #[must_use]
+    pub fn missing_scenario(&self) -> Option<String> {
+        let config = Config::deserialize(self.table.clone()).ok()?;
+        config.env.missing_scenario().map(str::to_owned)
+    }
+
+    /// Lays the text of the scenario file that the map names, so that the configuration needs the file no more.
+    #[must_use]
+    pub fn scenario(mut self, text: &str) -> Self {
+        let path = ["env", "scenario"].map(str::to_owned);
+        insert(&mut self.table, &path, toml::Value::String(text.to_owned()));
+        let origin = self.origin("env.map");
+        self.origins.insert(path.join("."), origin);
+        self
+    }
+
     /// Checks ranges and gives the configuration.
     ///
     /// # Errors

@@ -1,0 +1,100 @@
+//! The command that plays with scripted teams.
+
+use std::{num::NonZeroU64, path::PathBuf};
+
+use clap::{Args, ValueEnum};
+use mackrl_env::skirmish::scripted::ScriptedPolicy;
+
+use crate::args::runs::ThreadsArgs;
+
+/// Play with a scripted team, and report, record, replay or draw what happens
+///
+/// Prints the mean and the standard error of battles won, return, episode length, and allies and enemies lost. Scripted agents
+/// decide from their own local views, as trained ones do. The number of threads changes the speed and nothing else.
+///
+/// --record writes one episode as JSON: the map, the settings, the seed, every action and a hash of the state after every
+/// step. --replay plays such a file again and says where it first differs, if it does. --svg draws one step of it.
+///
+/// Examples:
+///   mackrl play --map 2s3z --policy focus-fire --episodes 1000 --json
+///   mackrl play --map all --policy all
+///   mackrl play --map ./my.toml --policy kite --svg battle.svg --step 12
+///   mackrl play --map 3m --record episode.json && mackrl play --replay episode.json
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub(crate) struct PlayArgs {
+    /// Map to play, as `mackrl maps` lists it, a scenario file ending in .toml, or `all`
+    #[arg(long, value_name = "MAP", default_value = "3m")]
+    pub(crate) map: String,
+
+    /// How the team plays
+    #[arg(long, value_name = "NAME", value_enum, default_value = "focus-fire")]
+    pub(crate) policy: PolicyChoice,
+
+    /// Episodes to play
+    #[arg(long, value_name = "N", default_value = "100")]
+    pub(crate) episodes: NonZeroU64,
+
+    /// Seed from which all randomness follows
+    #[arg(long, value_name = "S", default_value = "1")]
+    pub(crate) seed: u64,
+
+    /// One setting of the game, such as `env.sight_range=7`; repeatable
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub(crate) set: Vec<String>,
+
+    #[command(flatten)]
+    pub(crate) threads: ThreadsArgs,
+
+    /// Print JSON instead of a table
+    #[arg(long)]
+    pub(crate) json: bool,
+
+    /// Write the first episode to this file, and play no other
+    #[arg(long, value_name = "FILE", help_heading = "One episode")]
+    pub(crate) record: Option<PathBuf>,
+
+    /// Play what this file records; the map, the settings and the seed are those of the file
+    #[arg(long, value_name = "FILE", help_heading = "One episode",
+          conflicts_with_all = ["record", "map", "policy", "episodes", "seed", "set", "threads"])]
+    pub(crate) replay: Option<PathBuf>,
+
+    /// Draw one step of the first episode to this file (as an image if it ends in .png), and play no other
+    #[arg(long, value_name = "FILE", help_heading = "One episode")]
+    pub(crate) svg: Option<PathBuf>,
+
+    /// Step to draw: 0 is the start [default: half of the episode]
+    #[arg(long, value_name = "T", requires = "svg", help_heading = "One episode")]
+    pub(crate) step: Option<usize>,
+}
+
+/// A scripted policy, or all of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PolicyChoice {
+    /// Any available action, all equally likely
+    Random,
+    /// Stands and never shoots
+    Idle,
+    /// Shoots at the nearest enemy
+    Nearest,
+    /// Shoots at the weakest enemy in range
+    FocusFire,
+    /// Backs off while its weapon reloads
+    Kite,
+    /// One after the other
+    All,
+}
+
+impl PolicyChoice {
+    /// What was chosen.
+    pub(crate) fn policies(self) -> Vec<ScriptedPolicy> {
+        vec![match self {
+            Self::Random => ScriptedPolicy::Random,
+            Self::Idle => ScriptedPolicy::Idle,
+            Self::Nearest => ScriptedPolicy::Nearest,
+            Self::FocusFire => ScriptedPolicy::FocusFire,
+            Self::Kite => ScriptedPolicy::Kite,
+            Self::All => return ScriptedPolicy::ALL.to_vec(),
+        }]
+    }
+}

@@ -1,0 +1,47 @@
+//! Reading files that may be anything, devices and endless streams included.
+
+use std::{fs::File, io::Read, path::Path};
+
+use anyhow::Context;
+
+use crate::failure::Failure;
+
+/// The content of a file of at most `length_max` bytes.
+///
+/// # Errors
+/// What the operating system says, or [`Failure::BadData`] if there is more.
+pub(crate) fn read(path: &Path, length_max: usize) -> anyhow::Result<Vec<u8>> {
+    let cannot = || format!("cannot read {}", path.display());
+    let file = File::open(path).with_context(cannot)?;
+    let mut bytes = Vec::new();
+    file.take(length_max as u64 + 1)
+        .read_to_end(&mut bytes)
+        .with_context(cannot)?;
+    if bytes.len() > length_max {
+        let message = format!(
+            "{} is too long, expected at most {length_max} bytes",
+            path.display()
+        );
+        return Err(Failure::BadData { message }.into());
+    }
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_read_up_to_its_bound_and_not_beyond() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        std::fs::write(&path, [7; 11]).unwrap();
+        assert_eq!(read(&path, 11).unwrap(), [7; 11]);
+        assert!(
+            read(&path, 10)
+                .unwrap_err()
+                .to_string()
+                .contains("at most 10 bytes")
+        );
+    }
+}
