@@ -131,6 +131,12 @@ fn a_damaged_checkpoint_is_noticed_and_an_earlier_one_used() {
     let all = checkpoints(&run);
     assert_eq!(all.len(), 2, "two checkpoints are kept");
     flip(&all[1]);
+    let undamaged = all[0].join("tensors.safetensors");
+    let kept = fs::read(&undamaged).expect("a checkpoint has tensors");
+    flip(&all[0]);
+    let stderr = exits(resume(&run, 1), 65);
+    assert!(stderr.contains("is damaged"), "{stderr}");
+    fs::write(&undamaged, kept).expect("a checkpoint can be mended");
     let stderr = exits(resume(&run, 1), 0);
     assert!(stderr.starts_with("warning: "), "{stderr}");
     assert!(
@@ -138,7 +144,23 @@ fn a_damaged_checkpoint_is_noticed_and_an_earlier_one_used() {
         "{stderr}"
     );
     assert!(outcome(&run) == expected);
-    checkpoints(&run).iter().for_each(|path| flip(path));
-    let stderr = exits(resume(&run, 1), 65);
-    assert!(stderr.contains("is damaged"), "{stderr}");
+}
+
+#[test]
+fn a_finished_run_is_left_as_it_is() {
+    let parent = tempfile::tempdir().expect("a folder for the run");
+    let run = parent.path().join("run");
+    exits(train(&run, &[]), 0);
+    let files = || {
+        ["weights.safetensors", "metrics.jsonl", "run.json"]
+            .map(|name| fs::read(run.join(name)).expect("a finished run has its files"))
+    };
+    let before = files();
+    fs::remove_dir_all(run.join("checkpoints")).expect("checkpoints can be removed");
+    let stderr = exits(resume(&run, 1), 0);
+    assert!(
+        stderr.contains("is finished: nothing is left to do"),
+        "{stderr}"
+    );
+    assert!(files() == before, "a finished run was touched");
 }

@@ -13,6 +13,12 @@ use crate::{
 
 /// Continues a run at its latest checkpoint; from then on it is as if it had never stopped.
 pub(crate) fn run(args: &ResumeArgs) -> anyhow::Result<()> {
+    if RunFolder::is_finished(&args.run) {
+        // Nothing is wrong: whoever starts runs again until they are finished gets what they want.
+        let folder = args.run.display();
+        let _ = writeln!(io::stderr(), "{folder} is finished: nothing is left to do");
+        return Ok(());
+    }
     let stop = StopRequest::listen()?;
     let threads = args.threads.count();
     let Resumption {

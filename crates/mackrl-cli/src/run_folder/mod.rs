@@ -145,6 +145,11 @@ impl RunFolder {
         Self::open(path, config, threads, lock, 0)
     }
 
+    /// Whether the run there has reached its end.
+    pub(crate) fn is_finished(path: &Path) -> bool {
+        recorded_status(path) == Some(Status::Finished)
+    }
+
     /// Opens the folder of an unfinished run at its latest checkpoint. What was written after it is removed: it will be written
     /// again.
     ///
