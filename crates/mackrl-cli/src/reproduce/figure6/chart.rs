@@ -34,7 +34,17 @@ pub(super) fn chart(panel: &Panel, steps: &[u64]) -> LineChart {
             rings(None, mackrl, &panel.published.mackrl),
             rings(Some("published 2018, StarCraft II"), Colour::GREY, &[]),
         ],
-        legend: Corner::LowerRight,
+        legend: emptiest_corner(panel),
+    }
+}
+
+/// Curves that end high leave room below, others above where they begin.
+fn emptiest_corner(panel: &Panel) -> Corner {
+    let ends = [&panel.mackrl, &panel.central_v].map(|curve| curve.mean.last().copied());
+    if ends.into_iter().flatten().all(|end| end > 0.5) {
+        Corner::LowerRight
+    } else {
+        Corner::UpperLeft
     }
 }
 
