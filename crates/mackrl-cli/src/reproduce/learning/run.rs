@@ -10,6 +10,7 @@ use mackrl::{
 use serde::{Deserialize, Serialize};
 
 use super::{LearningOptions, PROGRESS_STEPS};
+use crate::reproduce::write;
 
 /// Who learns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -81,19 +82,17 @@ impl Job {
         let json = serde_json::to_string(&run)? + "\n";
         let folder = path.parent().context("a run lies in a folder")?;
         fs::create_dir_all(folder).with_context(|| format!("creating {}", folder.display()))?;
-        let unfinished = path.with_extension("tmp");
-        fs::write(&unfinished, json)
-            .and_then(|()| fs::rename(&unfinished, &path))
-            .with_context(|| format!("writing {}", path.display()))?;
+        write(folder, &self.file_name(), json.as_bytes())?;
         Ok(run)
     }
 
     fn path(&self, options: &LearningOptions) -> PathBuf {
+        options.out.join("runs").join(self.file_name())
+    }
+
+    fn file_name(&self) -> String {
         let Self { map, learner, seed } = self;
-        options
-            .out
-            .join("runs")
-            .join(format!("{map}-{}-seed{seed}.json", learner.setting()))
+        format!("{map}-{}-seed{seed}.json", learner.setting())
     }
 
     fn config(&self, options: &LearningOptions) -> anyhow::Result<Config> {
