@@ -14,6 +14,7 @@
 
 pub mod adapter;
 pub mod episode_name;
+pub mod lifetime;
 pub mod protocol;
 pub mod stand_in;
 pub mod units;

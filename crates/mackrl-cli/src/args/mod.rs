@@ -4,6 +4,7 @@ mod bench;
 mod configuration;
 mod play;
 mod runs;
+mod sc2;
 
 use std::path::PathBuf;
 
@@ -16,6 +17,7 @@ pub(crate) use bench::{
 pub(crate) use configuration::{ConfigurationArgs, read_scenario, with_scenario};
 pub(crate) use play::PlayArgs;
 pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, TrainArgs};
+pub(crate) use sc2::{InstallArgs, Sc2Args, Sc2Command, ServeArgs, UnitsChoice};
 
 /// Teaches teams to coordinate without communicating, by acting jointly on what they commonly know.
 ///
@@ -44,6 +46,7 @@ pub(crate) enum Command {
     Maps(MapsArgs),
     Config(ConfigArgs),
     Bench(BenchArgs),
+    Sc2(Sc2Args),
 }
 
 /// Reproduce a figure of the paper, and judge what the paper says about it

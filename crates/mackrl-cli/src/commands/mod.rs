@@ -9,4 +9,5 @@ pub(crate) mod maps;
 pub(crate) mod play;
 pub(crate) mod reproduce;
 pub(crate) mod resume;
+pub(crate) mod sc2;
 pub(crate) mod train;

@@ -14,6 +14,7 @@ mod game;
 pub mod install;
 mod server;
 
+pub(crate) use answers::race;
 pub use arena::{Arena, EpisodeRecord};
 pub use arguments::{GameArguments, InvalidArgument};
 pub use game::{Game, ReplayWriter};

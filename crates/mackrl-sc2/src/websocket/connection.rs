@@ -99,10 +99,8 @@ impl Connection {
     }
 
     /// Sends bytes as they are, whatever they mean to the peer.
-    ///
-    /// # Errors
-    /// If the peer is gone.
-    pub(crate) fn send_unframed(&mut self, bytes: &[u8]) -> Result<(), WebsocketError> {
+    #[cfg(test)]
+    pub(super) fn send_unframed(&mut self, bytes: &[u8]) -> Result<(), WebsocketError> {
         self.write(bytes)
     }
 
