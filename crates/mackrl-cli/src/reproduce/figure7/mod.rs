@@ -37,7 +37,7 @@ const PUBLISHED: [[f64; ENEMIES + 1]; 4] = [
 
 /// Reproduce Figure 7: how often pairs delegate, by how many enemies they commonly know, on 2s3z.
 ///
-/// Trains MACKRL with preset `paper` as figure6 does, and looks at four moments of training. Runs that figure6 has finished in
+/// Trains MACKRL as figure6 does, and looks at four moments of training. Runs that figure6 has finished in
 /// the same folder are used as they are.
 ///
 /// Writes figure7.svg, figure7.png and figure7.json, prints the rates beside the published ones, and judges what the paper says.
