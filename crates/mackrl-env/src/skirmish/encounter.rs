@@ -17,15 +17,17 @@ use crate::{
 #[derive(Debug, Clone)]
 pub struct Encounter {
     scenario: Arc<Scenario>,
-    /// The state in which every episode starts, but for the enemies' orders.
+    /// Everybody at the places of the map.
     muster: BattleState,
+    /// How far from these places an episode starts, in map units along each axis.
+    scatter: f32,
     pub(super) battle: Battle,
 }
 
 impl Encounter {
-    /// Puts everybody at their places.
+    /// Puts everybody at their places. Episodes will start up to `scatter` map units from there along each axis.
     #[must_use]
-    pub fn new(scenario: Arc<Scenario>) -> Self {
+    pub fn new(scenario: Arc<Scenario>, scatter: f32) -> Self {
         let mut battle = Battle::new(scenario.field.clone(), scenario.recruits.len());
         for recruit in &scenario.recruits {
             let stance = match recruit.team {
@@ -36,6 +38,7 @@ impl Encounter {
         }
         Self {
             muster: battle.state().clone(),
+            scatter,
             battle,
             scenario,
         }
@@ -53,16 +56,21 @@ impl Encounter {
         &self.battle
     }
 
-    /// Everybody as they are when an episode starts.
+    /// Everybody at the places of the map.
     #[must_use]
     pub const fn muster(&self) -> &BattleState {
         &self.muster
     }
 
-    /// Puts everybody back, whole, and gives the enemies their order for the episode `key`.
+    /// Puts everybody back, whole, scattered as the episode `key` has it, and gives the enemies their order.
     pub fn begin(&mut self, key: EpisodeKey) {
+        let mut chance = Chance::new(key, 0);
         self.battle.restore(&self.muster);
-        self.order_enemies(&mut Chance::new(key, 0));
+        self.battle.scatter(self.scatter, &mut chance);
+        // Agents are numbered by type, x and y as an episode begins. Fresh units of a type are alike, so places are exchanged
+        // instead of numbers.
+        self.battle.sort_places(0..self.scenario.agents);
+        self.order_enemies(&mut chance);
     }
 
     /// Gives a unit an order, as [`Battle::order`].

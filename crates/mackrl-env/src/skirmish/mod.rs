@@ -22,3 +22,8 @@ pub use face::{BattleTally, Face, Skirmish, SkirmishKnowledge};
 pub use scenario::Scenario;
 pub use settings::{Compatibility, SkirmishSettings};
 pub use unit_types::UnitData;
+
+/// Version of the rules and of their data: one key and the same actions give the same battle in every program with this number.
+///
+/// It is raised whenever `tests/golden/skirmish_hashes.txt` is recorded anew.
+pub const SIMULATOR_VERSION: u32 = 2;

@@ -42,7 +42,7 @@ impl StarCraft2 {
         settings: SkirmishSettings,
         pool: Arc<GamePool>,
     ) -> Result<Self, SkirmishError> {
-        let state = Encounter::new(Arc::clone(&scenario)).muster().clone();
+        let state = Encounter::new(Arc::clone(&scenario), 0.0).muster().clone();
         Ok(Self {
             face: Face::new(Arc::clone(&scenario), settings, &state)?,
             pool,
@@ -80,22 +80,26 @@ impl StarCraft2 {
         let at_hand = self.playing.take().map(|(game, _)| game);
         let game = at_hand.or_else(|| self.pool.take());
         let (scenario, state) = (&self.scenario, &mut self.state);
-        let muster = |units: &[crate::protocol::Unit]| Roster::read(scenario, units, state);
-        let (mut game, roster) = match game {
+        let mut muster = |units: &[crate::protocol::Unit]| Roster::read(scenario, units, state);
+        let mut game = match game {
             Some(mut game) => {
-                let roster = game.restart(muster)?;
-                (game, roster)
+                game.restart(&mut muster)?;
+                game
             }
             None => {
                 self.pool.count_launch();
                 let seed = (key.bits(0, Draw::Setup(0)) & u64::from(u32::MAX)) as u32;
                 let mut game = Game::launch(self.pool.settings(), scenario, seed)?;
-                let roster = game.begin(muster)?;
-                (game, roster)
+                game.begin(&mut muster)?;
+                game
             }
         };
         game.name_episode(key)?;
-        Ok((game, roster))
+        // Whoever takes the name for its dice may have put the armies elsewhere.
+        let roster = muster(&game.observe()?)?;
+        let lost =
+            || GameFault::garbage("observation", "units have vanished before the first step");
+        Ok((game, roster.ok_or_else(lost)?))
     }
 
     /// Plays one step in the game.

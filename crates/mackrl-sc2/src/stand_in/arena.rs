@@ -58,8 +58,8 @@ impl Arena {
     /// Never: the settings of the face are the built-in ones.
     #[must_use]
     pub fn new(scenario: Arc<Scenario>, seed: u64) -> Self {
-        let encounter = Encounter::new(Arc::clone(&scenario));
         let settings = SkirmishSettings::default();
+        let encounter = Encounter::new(Arc::clone(&scenario), settings.spawn_scatter);
         let face = Face::new(Arc::clone(&scenario), settings, encounter.muster())
             .expect("built-in settings are valid");
         let key = EpisodeKey::new(seed, Stream::Other, 0);

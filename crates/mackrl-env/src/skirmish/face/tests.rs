@@ -56,6 +56,11 @@ impl Play {
         );
         let units = UnitTypes::load(UnitData::Liberty).unwrap();
         let scenario = Scenario::parse("test", &map, &units).unwrap();
+        // Units stand where a test puts them.
+        let settings = SkirmishSettings {
+            spawn_scatter: 0.0,
+            ..settings
+        };
         let mut skirmish = Skirmish::new(Arc::new(scenario), settings).unwrap();
         let mut observations = Observations::new(skirmish.spec(), 1);
         skirmish.reset(
