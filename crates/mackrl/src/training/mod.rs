@@ -12,7 +12,7 @@ mod trainer;
 mod weights;
 
 pub use checkpoint::Checkpoint;
-pub use evaluation::{Evaluation, evaluate};
+pub use evaluation::{Episodes, Evaluation, evaluate, evaluate_in};
 pub use metrics::{METRICS, MetricRow};
 pub use trainer::Trainer;
 pub use weights::{read_weights, write_weights};

@@ -25,6 +25,7 @@ const SHARD_SIZE: usize = 4;
 /// Trains one team.
 pub struct Trainer {
     config: Config,
+    world: assembly::World,
     policy: Box<dyn Decentralised>,
     learner: Learner,
     rollout: Rollout,
@@ -54,15 +55,27 @@ impl Trainer {
     /// # Errors
     /// [`Error::Config`] if the configuration describes nothing that can be trained.
     pub fn new(config: &Config, threads: usize) -> Result<Self, Error> {
-        let world = assembly::World::new(config)?;
-        let policy = assembly::policy(config, &world)?;
+        Self::in_world(config, &assembly::World::new(config)?, threads)
+    }
+
+    /// As [`Trainer::new`], in a world that need not be the built-in simulator's.
+    ///
+    /// # Errors
+    /// As [`Trainer::new`].
+    pub fn in_world(
+        config: &Config,
+        world: &assembly::World,
+        threads: usize,
+    ) -> Result<Self, Error> {
+        let policy = assembly::policy(config, world)?;
         let environments = world.environments(config.learner.environments)?;
         let sizes = [world.spec().agents, world.spec().state_size];
         let settings = assembly::learner(config);
         Ok(Self {
             learner: Learner::new(&*policy, sizes, settings, config.run.seed, threads),
             rollout: Rollout::new(&*policy, environments, SHARD_SIZE, threads),
-            evaluator: Evaluator::new(&*policy, &world, config.test.episodes, threads)?,
+            evaluator: Evaluator::new(&*policy, world, config.test.episodes, threads)?,
+            world: world.clone(),
             policy,
             config: config.clone(),
             steps_env: 0,
@@ -91,7 +104,8 @@ impl Trainer {
     /// and after the last batch. Gives a row of metrics at every test and at every interval between.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] if a gradient is not finite; the policy has not changed then.
+    /// [`Error::NotFinite`] if a gradient is not finite, [`Error::Step`] if a world cannot be played in any more; the policy has
+    /// not changed then.
     pub fn update(&mut self) -> Result<Option<MetricRow>, Error> {
         if self.steps_env >= self.next_test {
             return self.test().map(Some);
@@ -255,6 +269,13 @@ impl Trainer {
                 "sys/sps",
                 played / interval.began.elapsed().as_secs_f64().max(1e-9),
             );
+        }
+        let discarded = self.rollout.discarded() + self.evaluator.discarded();
+        if discarded > 0 {
+            row.push("sys/episodes_discarded", discarded as f64);
+        }
+        for (name, count) in self.world.source().counts() {
+            row.push(name, count as f64);
         }
         row
     }
