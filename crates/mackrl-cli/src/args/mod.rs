@@ -18,9 +18,12 @@ pub(crate) use bench::{
     BenchArgs, BenchCommand, BenchEnvironmentArgs, BenchTrainArgs, BenchUpdateArgs,
 };
 pub(crate) use configuration::{ConfigurationArgs, read_scenario, with_scenario};
-pub(crate) use play::PlayArgs;
+pub(crate) use play::{PlayArgs, PolicyChoice};
 pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, TrainArgs};
-pub(crate) use sc2::{InstallArgs, Sc2Args, Sc2Command, ServeArgs, UnitsChoice};
+pub(crate) use sc2::{
+    DoctorArgs, ExecGameArgs, InstallArgs, KillArgs, PsArgs, RecordArgs, Sc2Args, Sc2Command,
+    ServeArgs, UnitsChoice,
+};
 
 /// Teaches teams to coordinate without communicating, by acting jointly on what they commonly know.
 ///

@@ -27,6 +27,10 @@ pub(crate) struct PlayArgs {
     #[arg(long, value_name = "MAP", default_value = "3m")]
     pub(crate) map: String,
 
+    /// What plays the battles: simulator, or sc2 for StarCraft II on this machine, whose own replay --record writes
+    #[arg(long, value_name = "NAME", default_value = "simulator")]
+    pub(crate) env: String,
+
     /// How the team plays
     #[arg(long, value_name = "NAME", value_enum, default_value = "focus-fire")]
     pub(crate) policy: PolicyChoice,
@@ -56,7 +60,7 @@ pub(crate) struct PlayArgs {
 
     /// Play what this file records; the map, the settings and the seed are those of the file
     #[arg(long, value_name = "FILE", help_heading = "One episode",
-          conflicts_with_all = ["record", "map", "policy", "episodes", "seed", "set", "threads"])]
+          conflicts_with_all = ["record", "map", "env", "policy", "episodes", "seed", "set", "threads"])]
     pub(crate) replay: Option<PathBuf>,
 
     /// Draw one step of the first episode to this file (as an image if it ends in .png), and play no other

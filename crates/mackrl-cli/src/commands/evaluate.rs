@@ -1,11 +1,12 @@
 //! `mackrl evaluate`: how well a trained team plays.
 
 use anyhow::Context;
-use mackrl::training::{Evaluation, evaluate};
+use mackrl::training::{Episodes, Evaluation, evaluate_in};
 use serde_json::Value;
 
 use crate::{
     args::EvaluateArgs,
+    commands::sc2,
     output::{self, Sourced},
     provenance::{Choice, Judgement, Provenance},
     run_folder::Run,
@@ -17,8 +18,17 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     let seed = args.seed.unwrap_or(run.config.run.seed);
     let episodes = args.episodes.get();
     let threads = args.threads.count();
-    let evaluation = evaluate(&run.config, &run.weights, episodes, seed, threads)
-        .with_context(|| format!("cannot evaluate {}", args.run.display()))?;
+    let evaluation = evaluate_in(
+        &sc2::world(&run.config)?,
+        &run.config,
+        &run.weights,
+        Episodes {
+            count: episodes,
+            seed,
+        },
+        threads,
+    )
+    .with_context(|| format!("cannot evaluate {}", args.run.display()))?;
     let judgement = Judgement {
         actions: Choice::Greedy,
         episodes,

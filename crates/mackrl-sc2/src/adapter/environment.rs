@@ -1,6 +1,6 @@
 //! A map of StarCraft II as an environment.
 
-use std::{sync::Arc, thread, time::Duration};
+use std::{fmt, sync::Arc, thread, time::Duration};
 
 use mackrl_env::{
     Action, Draw, EntitySet, Environment, EnvironmentSpec, EpisodeKey, EpisodeStatistics,
@@ -9,14 +9,17 @@ use mackrl_env::{
 };
 
 use super::{fault::GameFault, game::Game, pool::GamePool, roster::Roster};
+use crate::protocol::Unit;
 
 /// Waited before another try after a failure, and doubled with each further one.
 const PAUSE: Duration = Duration::from_millis(20);
 /// Longest pause between two tries.
 const PAUSE_MAX: Duration = Duration::from_secs(5);
 
+/// Hears of every loop: its number in the game, and everybody who lives.
+pub type Watcher = Box<dyn FnMut(u32, &[Unit]) + Send>;
+
 /// Episodes of one map, played in games of a pool.
-#[derive(Debug)]
 pub struct StarCraft2 {
     pool: Arc<GamePool>,
     scenario: Arc<Scenario>,
@@ -30,6 +33,7 @@ pub struct StarCraft2 {
     failures: u32,
     /// Whether the game is asked for a replay when an episode has ended, and the latest that it gave.
     replays: Option<Option<Result<Vec<u8>, GameFault>>>,
+    watcher: Option<Watcher>,
 }
 
 impl StarCraft2 {
@@ -52,6 +56,7 @@ impl StarCraft2 {
             interruption: None,
             failures: 0,
             replays: None,
+            watcher: None,
         })
     }
 
@@ -64,6 +69,11 @@ impl StarCraft2 {
     /// Asks the game for a replay whenever an episode has ended.
     pub fn keep_replays(&mut self) {
         self.replays.get_or_insert(None);
+    }
+
+    /// Lets `watcher` see every loop, which are then played one by one.
+    pub fn watch(&mut self, watcher: Watcher) {
+        self.watcher = Some(watcher);
     }
 
     /// The game up to the end of the latest episode, as a file of the game's own.
@@ -80,7 +90,7 @@ impl StarCraft2 {
         let at_hand = self.playing.take().map(|(game, _)| game);
         let game = at_hand.or_else(|| self.pool.take());
         let (scenario, state) = (&self.scenario, &mut self.state);
-        let mut muster = |units: &[crate::protocol::Unit]| Roster::read(scenario, units, state);
+        let mut muster = |units: &[Unit]| Roster::read(scenario, units, state);
         let mut game = match game {
             Some(mut game) => {
                 game.restart(&mut muster)?;
@@ -113,7 +123,18 @@ impl StarCraft2 {
                 .map(|order| (agent, order))
         });
         game.order(roster, orders)?;
-        let units = game.step(self.face.settings().step_mul.into())?;
+        let loops = u32::from(self.face.settings().step_mul);
+        let units = match &mut self.watcher {
+            None => game.step(loops)?,
+            Some(watcher) => {
+                let mut units = Vec::new();
+                for _ in 0..loops {
+                    units = game.step(1)?;
+                    watcher(game.game_loop(), &units);
+                }
+                units
+            }
+        };
         roster.update(&self.scenario, &units, &mut self.state)
     }
 
@@ -216,5 +237,16 @@ impl Environment for StarCraft2 {
 
     fn statistics(&self) -> EpisodeStatistics {
         self.face.statistics()
+    }
+}
+
+impl fmt::Debug for StarCraft2 {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter
+            .debug_struct("StarCraft2")
+            .field("map", &self.scenario.name)
+            .field("playing", &self.playing)
+            .field("failures", &self.failures)
+            .finish_non_exhaustive()
     }
 }

@@ -21,7 +21,7 @@ mod pool;
 pub mod process;
 mod roster;
 
-pub use environment::StarCraft2;
+pub use environment::{StarCraft2, Watcher};
 pub use fault::{FaultKind, GameFault};
 pub use game::Game;
 pub use installation::{Installation, InstallationProblem};

@@ -8,11 +8,12 @@ mod view;
 use std::path::Path;
 
 use anyhow::Context;
-use mackrl::config::{ConfigBuilder, EnvironmentConfig};
+use mackrl::config::{ConfigBuilder, Engine, EnvironmentConfig};
 use mackrl_env::{EpisodeKey, Stream, registry};
 
 use crate::{
     args::{PlayArgs, with_scenario},
+    commands::sc2,
     failure::Failure,
     output,
     reproduce::meter::Meter,
@@ -43,6 +44,9 @@ pub(crate) fn run(args: &PlayArgs) -> anyhow::Result<()> {
         .into());
     };
     let key = EpisodeKey::new(args.seed, Stream::Other, 0);
+    if map.engine == Engine::Sc2 {
+        return sc2::play_one(args, map, *policy, key);
+    }
     let episode = Episode::play(map, *policy, key)?;
     if let Some(file) = &args.record {
         Recording::of(&episode).write(file)?;
@@ -63,6 +67,8 @@ fn map(args: &PlayArgs, name: &str) -> anyhow::Result<EnvironmentConfig> {
     let quoted = serde_json::to_string(name).context("a name is a string")?;
     let typed = format!("--map {name}");
     let mut builder = ConfigBuilder::new().flag(&typed, &format!("env.map={quoted}"))?;
+    let typed = format!("--env {}", args.env);
+    builder = builder.flag(&typed, &format!("env.engine={}", args.env))?;
     for assignment in &args.set {
         builder = builder.set(assignment)?;
     }
