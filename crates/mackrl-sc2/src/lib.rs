@@ -19,3 +19,6 @@ pub mod protocol;
 pub mod stand_in;
 pub mod units;
 pub mod websocket;
+
+#[cfg(test)]
+mod recorded_client;

@@ -14,7 +14,7 @@ use crate::protocol::Unit;
 /// Waited before another try after a failure, and doubled with each further one.
 const PAUSE: Duration = Duration::from_millis(20);
 /// Longest pause between two tries.
-const PAUSE_MAX: Duration = Duration::from_secs(5);
+const PAUSE_MAX: Duration = Duration::from_secs(2);
 
 /// Hears of every loop: its number in the game, and everybody who lives.
 pub type Watcher = Box<dyn FnMut(u32, &[Unit]) + Send>;
@@ -193,6 +193,7 @@ impl Environment for StarCraft2 {
 
     fn reset(&mut self, key: EpisodeKey, out: &mut ObservationMut<'_>) {
         self.interruption = None;
+        let mut pause = PAUSE;
         loop {
             match self.begin(key) {
                 Ok(playing) => {
@@ -207,7 +208,8 @@ impl Environment for StarCraft2 {
                         Self::show_nothing(out, self.face.spec().actions);
                         return;
                     }
-                    thread::sleep((PAUSE * 2_u32.pow(self.failures.min(10))).min(PAUSE_MAX));
+                    thread::sleep(pause);
+                    pause = (2 * pause).min(PAUSE_MAX);
                 }
             }
         }

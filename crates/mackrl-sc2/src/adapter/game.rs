@@ -27,7 +27,7 @@ use crate::{
 };
 
 /// How often a starting game is asked whether it listens.
-const KNOCK: Duration = Duration::from_millis(50);
+const KNOCK: Duration = Duration::from_millis(10);
 /// Loops that SMAC lets pass after killing everybody.
 const RESTART_LOOPS: u32 = 2;
 /// Loops after which new armies should have appeared.

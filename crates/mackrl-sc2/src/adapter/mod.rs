@@ -19,7 +19,7 @@ mod game;
 mod installation;
 mod pool;
 pub mod process;
-mod roster;
+pub(crate) mod roster;
 
 pub use environment::{StarCraft2, Watcher};
 pub use fault::{FaultKind, GameFault};

@@ -20,7 +20,7 @@ const SLACK: f32 = 1.001;
 
 /// The armies of one episode by their tags: agents in SMAC's order, then enemies in the game's.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Roster {
+pub(crate) struct Roster {
     tags: Vec<u64>,
 }
 
@@ -28,7 +28,7 @@ impl Roster {
     /// Reads the armies at the beginning of an episode into `state`; `None` as long as they are incomplete.
     ///
     /// Agents are ordered by type, x and y. Their types are numbered from an unknown number on, the least that is there.
-    pub(super) fn read(
+    pub(crate) fn read(
         scenario: &Scenario,
         found: &[Unit],
         state: &mut BattleState,
@@ -85,18 +85,18 @@ impl Roster {
     }
 
     /// The tag of unit number `index`.
-    pub(super) fn tag(&self, index: usize) -> u64 {
+    pub(crate) fn tag(&self, index: usize) -> u64 {
         self.tags[index]
     }
 
     /// Whether any unit is one of `tags`.
-    pub(super) fn has_any(&self, tags: &[u64]) -> bool {
+    pub(crate) fn has_any(&self, tags: &[u64]) -> bool {
         self.tags.iter().any(|tag| tags.contains(tag))
     }
 
     /// Takes over how everybody is now. Whoever is not reported is dead; others than the roster's are ignored, as SMAC does:
     /// new armies may have appeared since the last of these died.
-    pub(super) fn update(
+    pub(crate) fn update(
         &self,
         scenario: &Scenario,
         found: &[Unit],
