@@ -3,7 +3,7 @@
 use mackrl_env::{Action, AgentId, EnvironmentSpec};
 
 use crate::{
-    Phase, Stopwatch,
+    NotFinite, Phase, Stopwatch,
     hierarchy::{
         Sampler,
         agent_controller::{AgentController, forced_action, is_alive},
@@ -98,7 +98,12 @@ struct CentralVActor {
 
 impl CentralVActor {
     /// Advances the controllers of all living agents; the dead have their one action.
-    fn run(&mut self, weights: &Weights, situation: Situation<'_>, actions_bn: &mut [Action]) {
+    fn run(
+        &mut self,
+        weights: &Weights,
+        situation: Situation<'_>,
+        actions_bn: &mut [Action],
+    ) -> Result<(), NotFinite> {
         let Self {
             controller,
             memory,
@@ -125,6 +130,14 @@ impl CentralVActor {
         }
         let exploration = situation.behaviour.exploration;
         memory.run(controller.controller(), &weights.agents, exploration);
+        memory.check_logits(|row| {
+            let (b, agent) = rows[row];
+            [
+                ("episode", b),
+                ("step", situation.step),
+                ("agent", agent.index()),
+            ]
+        })
     }
 }
 
@@ -137,8 +150,13 @@ impl Actor for CentralVActor {
         self.entropy = (0.0, 0.0);
     }
 
-    fn act(&mut self, weights: &Weights, situation: Situation<'_>, actions_bn: &mut [Action]) {
-        self.run(weights, situation, actions_bn);
+    fn act(
+        &mut self,
+        weights: &Weights,
+        situation: Situation<'_>,
+        actions_bn: &mut [Action],
+    ) -> Result<(), NotFinite> {
+        self.run(weights, situation, actions_bn)?;
         if self.recording == Recording::ForLearning {
             situation
                 .playing
@@ -165,6 +183,7 @@ impl Actor for CentralVActor {
             }
         }
         self.stopwatch.lap(Phase::Act);
+        Ok(())
     }
 
     fn backward(&mut self, weights: &Weights, weight_bt: &[Vec<f32>], gradient: &mut [f32]) -> f64 {

@@ -6,6 +6,6 @@
 mod critic;
 mod returns;
 
-pub(crate) use critic::not_finite;
 pub use critic::{CentralCritic, CriticReport, CriticSettings, CriticState};
+pub(crate) use critic::{broken_step, check_gradient};
 pub use returns::{ReturnSettings, lambda_returns};

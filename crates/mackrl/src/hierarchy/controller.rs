@@ -6,9 +6,10 @@
 use mackrl_env::EpisodeKey;
 
 use crate::{
+    NotFinite,
     nn::{
         MaskedLogSoftmax, NetworkSizes, ParameterLayout, RecurrentNetwork, RecurrentWeights,
-        Retention, Trace,
+        Retention, Trace, first_not_finite,
     },
     policy::{ControllerId, ControllerInput, Recording},
 };
@@ -19,13 +20,19 @@ const ABSENT: usize = usize::MAX;
 /// One controller's network.
 #[derive(Debug, Clone)]
 pub(crate) struct Controller {
+    name: &'static str,
     network: RecurrentNetwork,
 }
 
 impl Controller {
     /// Adds the controller's parameters to `layout`.
-    pub(crate) fn new(layout: &mut ParameterLayout, name: &str, sizes: NetworkSizes) -> Self {
+    pub(crate) fn new(
+        layout: &mut ParameterLayout,
+        name: &'static str,
+        sizes: NetworkSizes,
+    ) -> Self {
         Self {
+            name,
             network: RecurrentNetwork::new(layout, name, sizes),
         }
     }
@@ -49,6 +56,7 @@ impl Controller {
 /// The rows of one controller over an episode.
 #[derive(Debug)]
 pub(crate) struct ControllerMemory {
+    name: &'static str,
     sizes: NetworkSizes,
     recording: Recording,
     trace: Trace<f32>,
@@ -93,6 +101,7 @@ impl ControllerMemory {
     pub(crate) fn new(controller: &Controller) -> Self {
         let sizes = controller.network.sizes();
         Self {
+            name: controller.name,
             sizes,
             recording: Recording::Off,
             trace: Trace::new(sizes, Retention::LastStep),
@@ -199,6 +208,22 @@ impl ControllerMemory {
             &mut self.log_p_rc[place.clone()],
             &mut self.softmax_rc[place],
         );
+    }
+
+    /// Refuses logits of this step that are not finite; `instance` names what a row belongs to, outermost axis first.
+    pub(crate) fn check_logits<const N: usize>(
+        &self,
+        instance: impl FnOnce(usize) -> [(&'static str, usize); N],
+    ) -> Result<(), NotFinite> {
+        let logits = self.trace.last_logits();
+        let Some(index) = first_not_finite(logits) else {
+            return Ok(());
+        };
+        let columns = self.sizes.outputs;
+        let mut place = instance(index / columns).to_vec();
+        place.push(("column", index % columns));
+        let tensor = format!("logits of {}", self.name);
+        Err(NotFinite::new(tensor, &place, logits[index]))
     }
 
     /// The log-probabilities \[C\] of a row of this step.

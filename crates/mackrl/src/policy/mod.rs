@@ -18,7 +18,7 @@ pub use tables::{DELEGATE, PolicyShape, PolicyTable};
 pub use tally::Tally;
 
 use crate::{
-    Stopwatch,
+    NotFinite, Stopwatch,
     nn::{ParameterLayout, RecurrentWeights},
 };
 
@@ -124,7 +124,15 @@ pub trait Actor: Send {
     ///
     /// # Shapes
     /// `actions_bn` \[B, N\]; rows of environments that have left are not touched.
-    fn act(&mut self, weights: &Weights, situation: Situation<'_>, actions_bn: &mut [Action]);
+    ///
+    /// # Errors
+    /// [`NotFinite`] if a controller's logit is not finite: there is nothing to choose from then.
+    fn act(
+        &mut self,
+        weights: &Weights,
+        situation: Situation<'_>,
+        actions_bn: &mut [Action],
+    ) -> Result<(), NotFinite>;
 
     /// Adds `Σ_{b,t} weight_bt ∇ log p(u_t)` to `gradient` and returns `Σ_{b,t} weight_bt log p(u_t)`, where p is the
     /// marginal probability (eq. 5) of the joint action that was taken.

@@ -11,7 +11,7 @@ use super::{
     write_weights,
 };
 use crate::{
-    Error, Phase, Stopwatch,
+    Error, Moment, Phase, Stopwatch,
     config::Config,
     decentralised::Decentralised,
     learner::{Learner, UpdateReport},
@@ -91,7 +91,8 @@ impl Trainer {
     /// and after the last batch. Gives a row of metrics at every test and at every interval between.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] if a gradient is not finite; the policy has not changed then.
+    /// [`Error::NotFinite`] if a number is not finite: one that an environment gives, a logit, a number of the critic's, a
+    /// gradient, a moment or a parameter after the step. The trainer is as it was before then.
     pub fn update(&mut self) -> Result<Option<MetricRow>, Error> {
         if self.steps_env >= self.next_test {
             return self.test().map(Some);
@@ -181,6 +182,14 @@ impl Trainer {
         }
     }
 
+    /// What a number that is not finite is dated with.
+    const fn moment(&self) -> Moment {
+        Moment {
+            update: self.learner.updates(),
+            steps_env: self.steps_env,
+        }
+    }
+
     /// ε of the bounded softmax now: it falls linearly with the environment steps.
     fn exploration(&self) -> f64 {
         let schedule = &self.config.exploration;
@@ -195,24 +204,28 @@ impl Trainer {
             behaviour: Behaviour::sampled(exploration),
             recording: Recording::ForLearning,
         };
+        let moment = self.moment();
         let batch = self.config.learner.environments as u64;
         let seed = self.config.run.seed;
         let keys: Vec<EpisodeKey> = (self.episodes..self.episodes + batch)
             .map(|episode| EpisodeKey::new(seed, Stream::Training, episode))
             .collect();
         self.stopwatch.lap(Phase::Other);
-        self.rollout.play(self.learner.weights(), &keys, settings)?;
+        self.rollout
+            .play(self.learner.weights(), &keys, settings)
+            .map_err(|error| dated(error, moment))?;
         self.stopwatch.lap_shared_by(self.rollout.stopwatches());
+        let batches = self.rollout.batches().collect();
+        self.stopwatch.lap(Phase::Other);
+        let report = self
+            .learner
+            .update(&*self.policy, batches, &mut self.stopwatch)
+            .map_err(|broken| dated(broken.into(), moment))?;
         self.episodes += batch;
         for episode in self.rollout.batches().flat_map(|batch| &batch.episodes) {
             self.steps_env += episode.steps() as u64;
             self.interval.note_episode(episode);
         }
-        let batches = self.rollout.batches().collect();
-        self.stopwatch.lap(Phase::Other);
-        let report = self
-            .learner
-            .update(&*self.policy, batches, &mut self.stopwatch)?;
         self.interval.note_update(&report, exploration);
         self.interval.tally.merge(&self.rollout.tally());
         Ok(())
@@ -221,13 +234,15 @@ impl Trainer {
     /// Plays greedy test episodes.
     fn test(&mut self) -> Result<MetricRow, Error> {
         self.stopwatch.lap(Phase::Other);
+        let moment = self.moment();
         let test = &self.config.test;
         let (seed, first) = (self.config.run.seed, self.tests * test.episodes as u64);
         let evaluation = self
             .evaluator
             .play(self.learner.weights(), test.episodes, |episode| {
                 EpisodeKey::new(seed, Stream::Test, first + episode)
-            })?;
+            })
+            .map_err(|error| dated(error, moment))?;
         self.stopwatch.lap(Phase::Test);
         self.tests += 1;
         self.next_test = (self.steps_env / test.interval_steps_env + 1) * test.interval_steps_env;
@@ -257,6 +272,14 @@ impl Trainer {
             );
         }
         row
+    }
+}
+
+/// The error with the moment of training at which it came, if it is a number that is not finite.
+fn dated(error: Error, moment: Moment) -> Error {
+    match error {
+        Error::NotFinite(broken) => broken.at(moment).into(),
+        other => other,
     }
 }
 
