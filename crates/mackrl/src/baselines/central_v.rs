@@ -11,7 +11,7 @@ use crate::{
         initialisation_key,
         statistics::entropy,
     },
-    nn::ParameterLayout,
+    nn::{Named, ParameterLayout},
     policy::{Actor, ControllerId, ControllerInput, Policy, Recording, Situation, Tally, Weights},
 };
 
@@ -209,6 +209,14 @@ impl Actor for CentralVActor {
 
     fn stopwatch(&mut self) -> &mut Stopwatch {
         &mut self.stopwatch
+    }
+
+    fn activations(&self) -> Vec<Named<'_, f32>> {
+        self.memory.activations()
+    }
+
+    fn gradients(&self) -> Vec<Named<'_, f32>> {
+        self.memory.gradients()
     }
 
     fn controller_inputs(&self, b: usize) -> Vec<ControllerInput> {

@@ -6,8 +6,9 @@ use super::{ReturnSettings, lambda_returns};
 use crate::{
     NotFinite,
     nn::{
-        BrokenStep, FeedForward, FeedForwardTrace, FeedForwardWeights, Moments, NetworkSizes,
-        Optimiser, OptimiserKind, ParameterLayout, Stepped, clip_gradient_norm, first_not_finite,
+        BrokenStep, FeedForward, FeedForwardTrace, FeedForwardWeights, Moments, Named,
+        NetworkSizes, Optimiser, OptimiserKind, ParameterLayout, Stepped, clip_gradient_norm,
+        first_not_finite,
     },
     rollout::Episode,
 };
@@ -76,6 +77,8 @@ pub struct CentralCritic {
     updates_at_refresh: u64,
     /// The state before the latest sweep.
     before: CriticState,
+    /// What the latest sweep keeps of each episode.
+    sweeps: Vec<Sweep>,
 }
 
 /// What the sweep keeps of one episode.
@@ -123,6 +126,7 @@ impl CentralCritic {
             parameters,
             updates: 0,
             updates_at_refresh: 0,
+            sweeps: Vec::new(),
         }
     }
 
@@ -186,7 +190,15 @@ impl CentralCritic {
         advantage_bt: &mut Vec<Vec<f32>>,
     ) -> Result<CriticReport, NotFinite> {
         self.save();
-        let swept = self.try_sweep(episodes, advantage_bt);
+        let mut sweeps = std::mem::take(&mut self.sweeps);
+        let swept = self.sweep_back(episodes, &mut sweeps);
+        advantage_bt.clear();
+        advantage_bt.extend(
+            sweeps
+                .iter_mut()
+                .map(|sweep| std::mem::take(&mut sweep.advantage_t)),
+        );
+        self.sweeps = sweeps;
         if swept.is_err() {
             self.undo();
         }
@@ -198,16 +210,14 @@ impl CentralCritic {
         self.restore(self.before.clone());
     }
 
-    fn try_sweep(
+    fn sweep_back(
         &mut self,
         episodes: &[&Episode],
-        advantage_bt: &mut Vec<Vec<f32>>,
+        sweeps: &mut Vec<Sweep>,
     ) -> Result<CriticReport, NotFinite> {
         self.refresh_target_if_due();
-        let mut sweeps: Vec<Sweep> = episodes
-            .iter()
-            .map(|episode| self.prepare_sweep(episode))
-            .collect();
+        sweeps.clear();
+        sweeps.extend(episodes.iter().map(|episode| self.prepare_sweep(episode)));
         let longest = episodes
             .iter()
             .map(|episode| episode.steps())
@@ -215,15 +225,36 @@ impl CentralCritic {
             .unwrap_or(0);
         let mut total = CriticReport::default();
         for t in (0..longest).rev() {
-            let report = self.update(t, episodes, &mut sweeps)?;
+            let report = self.update(t, episodes, sweeps)?;
             total.loss += report.loss / longest as f64;
             total.gradient_norm += report.gradient_norm / longest as f64;
             total.td_error_abs += report.td_error_abs / longest as f64;
             total.target_mean += report.target_mean / longest as f64;
         }
-        advantage_bt.clear();
-        advantage_bt.extend(sweeps.into_iter().map(|sweep| sweep.advantage_t));
         Ok(total)
+    }
+
+    /// The λ-returns of the latest sweep, one list for each episode.
+    #[must_use]
+    pub fn returns(&self) -> Vec<Named<'_, f32>> {
+        let returns = self.sweeps.iter().map(|sweep| &sweep.return_t[..]);
+        returns
+            .map(|return_t| Named::new("critic λ-returns", ["step", ""], 1, return_t))
+            .collect()
+    }
+
+    /// What the latest sweep computed for the last time step that it came to, in that order; a row is an episode.
+    #[must_use]
+    pub fn activations(&self) -> Vec<Named<'_, f32>> {
+        self.trace.named("critic")
+    }
+
+    /// The latest gradient, and the state after the latest step, tensor by tensor.
+    #[must_use]
+    pub fn step_numbers(&self) -> Vec<Named<'_, f32>> {
+        let mut named = self.layout.named("gradient of ", &self.gradient);
+        named.extend(named_step(&self.layout, &self.optimiser, &self.parameters));
+        named
     }
 
     /// Remembers the present state, without allocating.
@@ -368,6 +399,22 @@ impl CentralCritic {
     }
 }
 
+/// The state after an optimiser's latest step, accepted or not, tensor by tensor.
+pub(crate) fn named_step<'a>(
+    layout: &ParameterLayout,
+    optimiser: &'a Optimiser<f32>,
+    parameters: &'a [f32],
+) -> Vec<Named<'a, f32>> {
+    let (moments, parameters) = optimiser.latest(parameters);
+    let mut named = Vec::new();
+    if !moments.first.is_empty() {
+        named.extend(layout.named("first moment of ", &moments.first));
+    }
+    named.extend(layout.named("second moment of ", &moments.second));
+    named.extend(layout.named("after the step, ", parameters));
+    named
+}
+
 /// Refuses a gradient that is not finite. Its norm, a sum of squares in double precision, is finite only if all of it is.
 pub(crate) fn check_gradient(
     norm: f64,
@@ -387,7 +434,7 @@ pub(crate) fn broken_step(
     layout: &ParameterLayout,
     optimiser: &Optimiser<f32>,
 ) -> NotFinite {
-    let (moments, parameters) = optimiser.proposed();
+    let (moments, parameters) = optimiser.latest(&[]);
     let (what, values) = match broken.what {
         Stepped::FirstMoment => ("first moment of", moments.first.as_slice()),
         Stepped::SecondMoment => ("second moment of", moments.second.as_slice()),

@@ -7,5 +7,5 @@ mod critic;
 mod returns;
 
 pub use critic::{CentralCritic, CriticReport, CriticSettings, CriticState};
-pub(crate) use critic::{broken_step, check_gradient};
+pub(crate) use critic::{broken_step, check_gradient, named_step};
 pub use returns::{ReturnSettings, lambda_returns};

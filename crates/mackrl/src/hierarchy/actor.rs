@@ -18,6 +18,7 @@ use crate::{
     NotFinite, Phase, Stopwatch,
     common_knowledge::common_knowledge,
     marginalisation::{MarginalGradient, log_likelihood_with_gradient},
+    nn::Named,
     partition::{Pair, PartitionBuffer},
     policy::{
         Actor, ControllerId, ControllerInput, DELEGATE, PolicyTable, Recording, Situation, Tally,
@@ -355,6 +356,18 @@ impl Actor for PairwiseActor {
 
     fn stopwatch(&mut self) -> &mut Stopwatch {
         &mut self.stopwatch
+    }
+
+    fn activations(&self) -> Vec<Named<'_, f32>> {
+        let upper = self.selector.iter();
+        let memories = upper.chain([&self.pairs, &self.agents]);
+        memories.flat_map(ControllerMemory::activations).collect()
+    }
+
+    fn gradients(&self) -> Vec<Named<'_, f32>> {
+        let upper = self.selector.iter();
+        let memories = upper.chain([&self.pairs, &self.agents]);
+        memories.flat_map(ControllerMemory::gradients).collect()
     }
 
     fn controller_inputs(&self, b: usize) -> Vec<ControllerInput> {

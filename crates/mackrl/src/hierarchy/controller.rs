@@ -8,7 +8,7 @@ use mackrl_env::EpisodeKey;
 use crate::{
     NotFinite,
     nn::{
-        MaskedLogSoftmax, NetworkSizes, ParameterLayout, RecurrentNetwork, RecurrentWeights,
+        MaskedLogSoftmax, Named, NetworkSizes, ParameterLayout, RecurrentNetwork, RecurrentWeights,
         Retention, Trace, first_not_finite,
     },
     policy::{ControllerId, ControllerInput, Recording},
@@ -248,6 +248,21 @@ impl ControllerMemory {
             controller,
             values: all[row * inputs..(row + 1) * inputs].to_vec(),
         }
+    }
+
+    /// What was computed since [`Self::begin`], in that order.
+    pub(crate) fn activations(&self) -> Vec<Named<'_, f32>> {
+        let mut activations = self.trace.named(self.name);
+        let columns = self.sizes.outputs;
+        let tables = &self.log_p_rc[..(self.first_row + self.rows) * columns];
+        let name = format!("{} log p", self.name);
+        activations.push(Named::new(name, ["row", "column"], columns, tables));
+        activations
+    }
+
+    /// What the latest backward pass computed, in that order.
+    pub(crate) fn gradients(&self) -> Vec<Named<'_, f32>> {
+        self.trace.named_gradients(self.name)
     }
 
     /// Notes that log p(u) of this step in `environment` depends on an entry of a row with the weight `posterior`.

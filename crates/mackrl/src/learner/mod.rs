@@ -12,8 +12,9 @@ use crate::{
     NotFinite, Phase, Real, Stopwatch,
     central_critic::{
         CentralCritic, CriticReport, CriticSettings, CriticState, broken_step, check_gradient,
+        named_step,
     },
-    nn::{Moments, Optimiser, OptimiserKind, clip_gradient_norm, first_not_finite},
+    nn::{Moments, Named, Optimiser, OptimiserKind, clip_gradient_norm, first_not_finite},
     parallel::for_each_in_parallel,
     policy::{Policy, Weights},
     rollout::{Episode, ShardBatch},
@@ -71,6 +72,18 @@ pub struct Learner {
     shard_gradients: Vec<Vec<f32>>,
     advantage_bt: Vec<Vec<f32>>,
     updates: u64,
+    reached: Reached,
+}
+
+/// How far an update came.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Reached {
+    /// The critic's sweep.
+    Critic,
+    /// The policy's gradient.
+    Gradient,
+    /// The optimiser's step.
+    Step,
 }
 
 /// One shard's part of the backward pass.
@@ -104,6 +117,7 @@ impl Learner {
             shard_gradients: Vec::new(),
             advantage_bt: Vec::new(),
             updates: 0,
+            reached: Reached::Critic,
             parameters,
         }
     }
@@ -130,6 +144,36 @@ impl Learner {
     #[must_use]
     pub const fn updates(&self) -> u64 {
         self.updates
+    }
+
+    /// How far the latest update came.
+    #[must_use]
+    pub const fn reached(&self) -> Reached {
+        self.reached
+    }
+
+    /// Advantages of the latest update, one list for each episode.
+    #[must_use]
+    pub fn advantages(&self) -> Vec<Named<'_, f32>> {
+        let advantages = self.advantage_bt.iter();
+        advantages
+            .map(|advantage_t| Named::new("advantages", ["step", ""], 1, advantage_t))
+            .collect()
+    }
+
+    /// The latest gradient of the policy, tensor by tensor.
+    #[must_use]
+    pub fn gradient(&self, policy: &dyn Policy) -> Vec<Named<'_, f32>> {
+        let gradient = self.shard_gradients.first();
+        gradient.map_or_else(Vec::new, |gradient| {
+            policy.layout().named("gradient of ", gradient)
+        })
+    }
+
+    /// The policy's state after the latest step, accepted or not, tensor by tensor.
+    #[must_use]
+    pub fn after_step(&self, policy: &dyn Policy) -> Vec<Named<'_, f32>> {
+        named_step(policy.layout(), &self.optimiser, &self.parameters)
     }
 
     /// What a checkpoint must hold.
@@ -171,6 +215,7 @@ impl Learner {
     ) -> Result<UpdateReport, NotFinite> {
         let episodes: Vec<&Episode> = shards.iter().flat_map(|shard| &shard.episodes).collect();
         let steps: usize = episodes.iter().map(|episode| episode.steps()).sum();
+        self.reached = Reached::Critic;
         let critic = self.critic.sweep(&episodes, &mut self.advantage_bt)?;
         stopwatch.lap(Phase::Critic);
         let stepped = self.policy_step(policy, shards, steps, stopwatch);
@@ -202,6 +247,7 @@ impl Learner {
         stopwatch: &mut Stopwatch,
     ) -> Result<(f64, f64), NotFinite> {
         check_advantages(&self.advantage_bt)?;
+        self.reached = Reached::Gradient;
         let objective = self.backward(shards, steps);
         stopwatch.lap(Phase::Backward);
         if !objective.is_finite() {
@@ -215,6 +261,7 @@ impl Learner {
         let norm = clip_gradient_norm(gradient, self.settings.gradient_norm_max);
         let layout = policy.layout();
         check_gradient(norm, layout, gradient)?;
+        self.reached = Reached::Step;
         let optimiser = &mut self.optimiser;
         optimiser
             .propose(self.settings.learning_rate, gradient, &self.parameters)

@@ -64,6 +64,8 @@ pub struct Optimiser<R> {
     moments: Moments<R>,
     /// Where [`propose`](Self::propose) writes.
     next: Proposal<R>,
+    /// Whether the latest proposal was not accepted.
+    refused: bool,
 }
 
 /// What would be after a step.
@@ -114,6 +116,7 @@ impl<E: Element> Optimiser<E> {
             kind,
             moments,
             next,
+            refused: false,
         }
     }
 
@@ -156,6 +159,7 @@ impl<E: Element> Optimiser<E> {
         let _ = self.propose(learning_rate, gradient, parameters);
         parameters.copy_from_slice(&self.next.parameters);
         std::mem::swap(&mut self.moments, &mut self.next.moments);
+        self.refused = false;
     }
 
     /// Computes one step against `gradient`, to be taken by [`accept`](Self::accept).
@@ -175,7 +179,9 @@ impl<E: Element> Optimiser<E> {
             kind,
             moments,
             next,
+            refused,
         } = self;
+        *refused = true;
         assert_eq!(
             gradient.len(),
             moments.second.len(),
@@ -236,12 +242,17 @@ impl<E: Element> Optimiser<E> {
         );
         std::mem::swap(parameters, &mut next.parameters);
         std::mem::swap(&mut self.moments, &mut next.moments);
+        self.refused = false;
     }
 
-    /// The moments and the parameters after the step that was proposed last.
+    /// The moments and the parameters after the latest step, whether or not it was accepted; `parameters` are the present ones.
     #[must_use]
-    pub fn proposed(&self) -> (&Moments<E>, &[E]) {
-        (&self.next.moments, &self.next.parameters)
+    pub fn latest<'a>(&'a self, parameters: &'a [E]) -> (&'a Moments<E>, &'a [E]) {
+        if self.refused {
+            (&self.next.moments, &self.next.parameters)
+        } else {
+            (&self.moments, parameters)
+        }
     }
 }
 

@@ -19,7 +19,7 @@ pub use tally::Tally;
 
 use crate::{
     NotFinite, Stopwatch,
-    nn::{ParameterLayout, RecurrentWeights},
+    nn::{Named, ParameterLayout, RecurrentWeights},
 };
 
 /// How a controller turns its distribution into a choice.
@@ -146,6 +146,17 @@ pub trait Actor: Send {
 
     /// Measures where the time of this actor and of the environments that it plays in goes, once it is started.
     fn stopwatch(&mut self) -> &mut Stopwatch;
+
+    /// What was computed since [`Self::begin`], in that order, for whoever looks for a number that is not finite. An actor
+    /// that keeps nothing has nothing to show.
+    fn activations(&self) -> Vec<Named<'_, f32>> {
+        Vec::new()
+    }
+
+    /// What the latest backward pass computed on its way to the parameters' gradients, in that order.
+    fn gradients(&self) -> Vec<Named<'_, f32>> {
+        Vec::new()
+    }
 
     /// What the controllers of environment `b` read at the latest step.
     fn controller_inputs(&self, b: usize) -> Vec<ControllerInput>;

@@ -25,10 +25,10 @@ const SHARD_SIZE: usize = 4;
 /// Trains one team.
 pub struct Trainer {
     config: Config,
-    policy: Box<dyn Decentralised>,
-    learner: Learner,
-    rollout: Rollout,
-    evaluator: Evaluator,
+    pub(super) policy: Box<dyn Decentralised>,
+    pub(super) learner: Learner,
+    pub(super) rollout: Rollout,
+    pub(super) evaluator: Evaluator,
     steps_env: u64,
     episodes: u64,
     tests: u64,
@@ -94,7 +94,7 @@ impl Trainer {
     /// [`Error::NotFinite`] if a number is not finite: one that an environment gives, a logit, a number of the critic's, a
     /// gradient, a moment or a parameter after the step. The trainer is as it was before then.
     pub fn update(&mut self) -> Result<Option<MetricRow>, Error> {
-        if self.steps_env >= self.next_test {
+        if self.is_test_due() {
             return self.test().map(Some);
         }
         self.learn()?;
@@ -182,6 +182,11 @@ impl Trainer {
         }
     }
 
+    /// Whether the next iteration is a test.
+    pub(super) const fn is_test_due(&self) -> bool {
+        self.steps_env >= self.next_test
+    }
+
     /// What a number that is not finite is dated with.
     const fn moment(&self) -> Moment {
         Moment {
@@ -199,15 +204,19 @@ impl Trainer {
 
     /// Plays a batch of training episodes and learns from it.
     fn learn(&mut self) -> Result<(), Error> {
-        let exploration = self.exploration();
+        self.play()?;
+        self.learn_from_batch()
+    }
+
+    /// Plays a batch of training episodes.
+    pub(super) fn play(&mut self) -> Result<(), Error> {
         let settings = RolloutSettings {
-            behaviour: Behaviour::sampled(exploration),
+            behaviour: Behaviour::sampled(self.exploration()),
             recording: Recording::ForLearning,
         };
         let moment = self.moment();
-        let batch = self.config.learner.environments as u64;
         let seed = self.config.run.seed;
-        let keys: Vec<EpisodeKey> = (self.episodes..self.episodes + batch)
+        let keys: Vec<EpisodeKey> = (self.episodes..self.episodes + self.batch())
             .map(|episode| EpisodeKey::new(seed, Stream::Training, episode))
             .collect();
         self.stopwatch.lap(Phase::Other);
@@ -215,13 +224,19 @@ impl Trainer {
             .play(self.learner.weights(), &keys, settings)
             .map_err(|error| dated(error, moment))?;
         self.stopwatch.lap_shared_by(self.rollout.stopwatches());
+        Ok(())
+    }
+
+    /// Learns from the batch that was played last.
+    pub(super) fn learn_from_batch(&mut self) -> Result<(), Error> {
+        let (exploration, moment) = (self.exploration(), self.moment());
         let batches = self.rollout.batches().collect();
         self.stopwatch.lap(Phase::Other);
         let report = self
             .learner
             .update(&*self.policy, batches, &mut self.stopwatch)
             .map_err(|broken| dated(broken.into(), moment))?;
-        self.episodes += batch;
+        self.episodes += self.batch();
         for episode in self.rollout.batches().flat_map(|batch| &batch.episodes) {
             self.steps_env += episode.steps() as u64;
             self.interval.note_episode(episode);
@@ -229,6 +244,11 @@ impl Trainer {
         self.interval.note_update(&report, exploration);
         self.interval.tally.merge(&self.rollout.tally());
         Ok(())
+    }
+
+    /// Episodes of a batch.
+    const fn batch(&self) -> u64 {
+        self.config.learner.environments as u64
     }
 
     /// Plays greedy test episodes.
