@@ -20,9 +20,9 @@ pub enum Error {
     /// A number that is not finite turned up.
     #[error(transparent)]
     NotFinite(Box<NotFinite>),
-    /// An environment refused an action.
+    /// An environment refused an action, or failed for good.
     #[error(transparent)]
-    IllegalAction(#[from] mackrl_env::IllegalAction),
+    Step(#[from] mackrl_env::StepError),
 }
 
 /// A number that is infinite or NaN, and where it turned up.

@@ -13,6 +13,7 @@ use super::{
     controller::ControllerMemory,
     sampling::{Path, Sampler},
     statistics::HierarchyStatistics,
+    thought,
 };
 use crate::{
     NotFinite, Phase, Stopwatch,
@@ -22,7 +23,7 @@ use crate::{
     partition::{Pair, PartitionBuffer},
     policy::{
         Actor, ControllerId, ControllerInput, DELEGATE, PolicyTable, Recording, Situation, Tally,
-        Weights,
+        Thought, Weights,
     },
 };
 
@@ -44,6 +45,14 @@ pub(super) struct PairwiseActor {
     /// Members' available actions, \[2, A\] and \[N, A\].
     pair_available_ga: Vec<bool>,
     team_available_ga: Vec<bool>,
+}
+
+/// One environment's tables at one step, and what was made of them.
+struct Decision<'a> {
+    table: PolicyTable<'a, f32>,
+    path: &'a mut Path,
+    known_k: &'a [EntitySet],
+    alive_n: &'a [bool],
 }
 
 /// What an actor keeps of one environment.
@@ -215,28 +224,20 @@ impl PairwiseActor {
 
     /// Walks down the hierarchy in environment `b` and, if recording, remembers how log p(u) depends on each choice.
     fn choose(&mut self, b: usize, situation: Situation<'_>, action_n: &mut [Action]) {
-        let hierarchy = &*self.hierarchy;
         let world = &mut self.worlds[b];
-        let key = &situation.keys[b];
-        let table = PolicyTable::new(
-            hierarchy.shape,
-            hierarchy
-                .partitions
-                .in_force(key, situation.step, &mut world.partition_buffer),
-            &world.log_p_selector_p,
-            &world.log_p_pair_kc,
-            &world.log_p_agent_na,
-        )
-        .expect("the buffers have the hierarchy's sizes");
-        let mode = situation.behaviour.mode;
+        let Decision {
+            table,
+            path,
+            known_k,
+            alive_n,
+        } = world.decision(&self.hierarchy, situation, b);
         let sampler = Sampler {
-            key: *key,
+            key: situation.keys[b],
             step: situation.step,
-            mode,
+            mode: situation.behaviour.mode,
         };
-        sampler.sample(&table, action_n, &mut world.path);
-        self.statistics
-            .observe(&table, &world.path, &world.known_k, &world.alive_n);
+        sampler.sample(&table, action_n, path);
+        self.statistics.observe(&table, path, known_k, alive_n);
         if self.recording == Recording::ForLearning {
             self.stopwatch.lap(Phase::Act);
             let log_p = log_likelihood_with_gradient(&table, action_n, &mut self.gradient);
@@ -399,6 +400,22 @@ impl Actor for PairwiseActor {
         }
         inputs
     }
+
+    fn thought(&mut self, b: usize, situation: Situation<'_>, action_n: &[Action]) -> Thought {
+        let decision = self.worlds[b].decision(&self.hierarchy, situation, b);
+        let log_p = log_likelihood_with_gradient(&decision.table, action_n, &mut self.gradient);
+        thought::describe(
+            &thought::Subject {
+                table: decision.table,
+                path: decision.path,
+                known_k: decision.known_k,
+                alive_n: decision.alive_n,
+                action_n,
+            },
+            &self.hierarchy.active_pairs,
+            (log_p, &self.gradient),
+        )
+    }
 }
 
 impl World {
@@ -445,6 +462,34 @@ impl World {
                 log_p_c.fill(f32::NEG_INFINITY);
                 log_p_c[DELEGATE] = 0.0;
             }
+        }
+    }
+
+    /// The tables of the latest step.
+    fn decision<'a>(
+        &'a mut self,
+        hierarchy: &'a Hierarchy,
+        situation: Situation<'_>,
+        b: usize,
+    ) -> Decision<'a> {
+        let partitions = hierarchy.partitions.in_force(
+            &situation.keys[b],
+            situation.step,
+            &mut self.partition_buffer,
+        );
+        let table = PolicyTable::new(
+            hierarchy.shape,
+            partitions,
+            &self.log_p_selector_p,
+            &self.log_p_pair_kc,
+            &self.log_p_agent_na,
+        )
+        .expect("the buffers have the hierarchy's sizes");
+        Decision {
+            table,
+            path: &mut self.path,
+            known_k: &self.known_k,
+            alive_n: &self.alive_n,
         }
     }
 

@@ -129,7 +129,7 @@ mod tests {
     use std::sync::Arc;
 
     use mackrl_env::{
-        Action, EnvironmentSpec, EpisodeStatistics, IllegalAction, ObservationMut, PriorKnowledge,
+        Action, EnvironmentSpec, EpisodeStatistics, ObservationMut, PriorKnowledge, StepError,
         Stream, TimeStep,
     };
 
@@ -207,7 +207,7 @@ mod tests {
             &mut self,
             actions: &[Action],
             out: &mut ObservationMut<'_>,
-        ) -> Result<TimeStep, IllegalAction> {
+        ) -> Result<TimeStep, StepError> {
             let mut step = self.world.step(actions, out)?;
             self.steps += 1;
             if self.steps == 3 {

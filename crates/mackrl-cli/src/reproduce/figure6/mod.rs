@@ -1,6 +1,6 @@
 //! `mackrl reproduce figure6`: win rates of MACKRL and Central-V during training, on `3m` and `2s3z`.
 //!
-//! Both learners have the same settings, preset `paper`; nothing is tuned for either. Each claim of the paper is judged by a
+//! Both learners have the same settings, those of a preset; nothing is tuned for either. Each claim of the paper is judged by a
 //! rule that is written beside it, and the published curve stands beside ours. Our game is a simulation of the paper's, so
 //! what carries over is the order of the learners, not the height of a curve.
 
@@ -30,7 +30,7 @@ const LEARNERS: [Learner; 2] = [Learner::Mackrl, Learner::CentralV];
 
 /// Reproduce Figure 6: win rates of MACKRL and Central-V during training, on 3m and 2s3z.
 ///
-/// Trains both learners with preset `paper`, many seeds each, with a greedy test after every interval. A run that is finished in
+/// Trains both learners with one preset, many seeds each, with a greedy test after every interval. A run that is finished in
 /// the folder is not repeated, so the command can be stopped and given again.
 ///
 /// Writes figure6-3m and figure6-2s3z as .svg and .png, and figure6.json, prints the curves beside the published ones, and

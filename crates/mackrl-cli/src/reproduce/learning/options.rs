@@ -13,6 +13,11 @@ pub(crate) struct LearningOptions {
     #[arg(long, value_name = "DIR", default_value = "runs/learning")]
     pub(crate) out: PathBuf,
 
+    /// Settings of both learners: paper-code, paper or default. The published figures fit the authors' code, not the paper's
+    /// text.
+    #[arg(long, value_name = "NAME", default_value = "paper-code")]
+    pub(crate) preset: String,
+
     /// Seeds of each learner on each map: 1 to N, at least 2.
     #[arg(
         long,
@@ -79,8 +84,8 @@ impl LearningOptions {
     #[must_use]
     pub(crate) fn command(&self, figure: &str) -> String {
         format!(
-            "mackrl reproduce {figure} --seeds {} --steps {} --interval {}",
-            self.seeds, self.steps, self.interval
+            "mackrl reproduce {figure} --preset {} --seeds {} --steps {} --interval {}",
+            self.preset, self.seeds, self.steps, self.interval
         )
     }
 }
@@ -90,6 +95,7 @@ impl Default for LearningOptions {
     fn default() -> Self {
         Self {
             out: PathBuf::new(),
+            preset: "paper-code".to_owned(),
             seeds: 2,
             steps: 1_000,
             interval: 1_000,

@@ -45,7 +45,7 @@ impl Learner {
     }
 }
 
-/// A run to be made: a learner on a map with a seed, all else by preset `paper`.
+/// A run to be made: a learner on a map with a seed, all else by a preset.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Job {
     /// The map's name.
@@ -131,7 +131,7 @@ impl Job {
             format!("run.metrics_interval_steps_env={interval}"),
             format!("test.interval_steps_env={interval}"),
         ];
-        let preset = ConfigBuilder::new().preset("paper")?;
+        let preset = ConfigBuilder::new().preset(&options.preset)?;
         let builder = settings
             .iter()
             .try_fold(preset, |builder, setting| builder.set(setting))?;
