@@ -3,6 +3,7 @@
 mod bench;
 mod configuration;
 mod play;
+mod replay;
 mod runs;
 
 use std::path::PathBuf;
@@ -15,6 +16,7 @@ pub(crate) use bench::{
 };
 pub(crate) use configuration::{ConfigurationArgs, read_scenario, with_scenario};
 pub(crate) use play::PlayArgs;
+pub(crate) use replay::{ExplainArgs, ReplayArgs};
 pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, TrainArgs};
 
 /// Teaches teams to coordinate without communicating, by acting jointly on what they commonly know.
@@ -41,6 +43,8 @@ pub(crate) enum Command {
     ExecuteAgent(ExecuteAgentArgs),
     Reproduce(ReproduceArgs),
     Play(PlayArgs),
+    Replay(ReplayArgs),
+    Explain(ExplainArgs),
     Maps(MapsArgs),
     Config(ConfigArgs),
     Bench(BenchArgs),
