@@ -9,6 +9,8 @@ use std::{
 
 use mackrl::config::{Config, ConfigError};
 
+use crate::provenance::CODE;
+
 /// What can go wrong in this program beyond what its libraries say.
 #[derive(Debug)]
 pub(crate) enum Failure {
@@ -28,6 +30,8 @@ pub(crate) enum Failure {
     NotARun { folder: PathBuf },
     /// Stored data that cannot be used.
     BadData { message: String },
+    /// A result of another version of this program, among which results of this one were to stand.
+    OtherCode { path: PathBuf, code: String },
     /// A team that does not run decentralised.
     CertificateFailed { mismatches: u64 },
     /// Flags that do not go together.
@@ -69,6 +73,11 @@ impl fmt::Display for Failure {
                 formatter,
                 "{} is not a run folder: it has no config.toml",
                 folder.display()
+            ),
+            Self::OtherCode { path, code } => write!(
+                formatter,
+                "{} was made by code {code}, expected {CODE}",
+                path.display()
             ),
             Self::BadData { message }
             | Self::Usage { message }
@@ -136,6 +145,7 @@ fn exit_of(cause: &(dyn std::error::Error + 'static)) -> Option<Exit> {
             | Failure::UnfinishedRun { .. }
             | Failure::FolderLocked { .. }
             | Failure::NotARun { .. }
+            | Failure::OtherCode { .. }
             | Failure::Usage { .. } => Exit::Usage,
             Failure::Interrupted { .. } => Exit::Interrupted,
             Failure::BadData { .. }
@@ -176,6 +186,10 @@ fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
             }
             Failure::NotARun { .. } => Some(
                 "give the folder that `mackrl train` wrote, such as runs/3m-mackrl-seed1"
+                    .to_owned(),
+            ),
+            Failure::OtherCode { .. } => Some(
+                "take such results as they are with --any-code, or choose another folder with --out"
                     .to_owned(),
             ),
             Failure::ReplayDiffers { .. } => Some(

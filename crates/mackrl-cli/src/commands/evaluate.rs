@@ -3,12 +3,22 @@
 use std::path::Path;
 
 use anyhow::Context;
-use mackrl::{policy::Behaviour, replay::record_policy, training::evaluate};
+use mackrl::{
+    policy::Behaviour,
+    replay::record_policy,
+    training::{Evaluation, evaluate},
+};
 use mackrl_env::{EpisodeKey, Stream};
-use serde::Serialize;
 use serde_json::Value;
 
-use crate::{args::EvaluateArgs, failure::Failure, output, reproduce::Meter, run_folder::Run};
+use crate::{
+    args::EvaluateArgs,
+    failure::Failure,
+    output::{self, Sourced},
+    provenance::{Choice, Judgement, Provenance},
+    reproduce::Meter,
+    run_folder::Run,
+};
 
 /// Plays greedy episodes with a trained team and prints how it did.
 pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
@@ -26,7 +36,12 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     let evaluation = evaluate(&run.config, &run.weights, episodes, seed, threads)
         .with_context(|| format!("cannot evaluate {}", args.run.display()))?;
     save_replays(&args.run, &run, seed, args.save_replays)?;
-    print(&evaluation, args.json)
+    let judgement = Judgement {
+        actions: Choice::Greedy,
+        episodes,
+    };
+    let provenance = Provenance::of_weights(&run.config, &run.weights, seed, judgement);
+    print(provenance, &evaluation, args.json)
 }
 
 /// Plays the first `count` of the episodes again and keeps them.
@@ -49,10 +64,13 @@ fn save_replays(folder: &Path, run: &Run, seed: u64, count: usize) -> anyhow::Re
     Ok(())
 }
 
-/// Prints an evaluation: a JSON object of numbers, or a table in which each mean stands beside its standard error.
-fn print(evaluation: &impl Serialize, json: bool) -> anyhow::Result<()> {
+/// Prints an evaluation: a JSON object of numbers and their provenance, or a table in which each mean stands beside its standard error.
+fn print(provenance: Provenance, evaluation: &Evaluation, json: bool) -> anyhow::Result<()> {
     if json {
-        output::print_json(evaluation)
+        output::print_json(&Sourced {
+            provenance,
+            result: evaluation,
+        })
     } else {
         output::print(&table(&serde_json::to_value(evaluation)?))
     }
