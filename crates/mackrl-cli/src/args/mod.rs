@@ -3,6 +3,7 @@
 mod bench;
 mod configuration;
 mod play;
+mod replay;
 mod runs;
 
 use std::path::PathBuf;
@@ -18,6 +19,7 @@ pub(crate) use bench::{
 };
 pub(crate) use configuration::{ConfigurationArgs, read_scenario, with_scenario};
 pub(crate) use play::PlayArgs;
+pub(crate) use replay::{ExplainArgs, ReplayArgs};
 pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, TrainArgs};
 
 /// Teaches teams to coordinate without communicating, by acting jointly on what they commonly know.
@@ -44,6 +46,8 @@ pub(crate) enum Command {
     ExecuteAgent(ExecuteAgentArgs),
     Reproduce(ReproduceArgs),
     Play(PlayArgs),
+    Replay(ReplayArgs),
+    Explain(ExplainArgs),
     Maps(MapsArgs),
     Config(ConfigArgs),
     Bench(BenchArgs),
