@@ -3,6 +3,7 @@
 mod bench;
 mod configuration;
 mod play;
+mod replay;
 mod runs;
 mod sc2;
 
@@ -19,6 +20,7 @@ pub(crate) use bench::{
 };
 pub(crate) use configuration::{ConfigurationArgs, read_scenario, with_scenario};
 pub(crate) use play::{PlayArgs, PolicyChoice};
+pub(crate) use replay::{ExplainArgs, ReplayArgs};
 pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, TrainArgs};
 pub(crate) use sc2::{
     DoctorArgs, ExecGameArgs, InstallArgs, KillArgs, PsArgs, RecordArgs, Sc2Args, Sc2Command,
@@ -49,6 +51,8 @@ pub(crate) enum Command {
     ExecuteAgent(ExecuteAgentArgs),
     Reproduce(ReproduceArgs),
     Play(PlayArgs),
+    Replay(ReplayArgs),
+    Explain(ExplainArgs),
     Maps(MapsArgs),
     Config(ConfigArgs),
     Bench(BenchArgs),

@@ -9,7 +9,7 @@ use mackrl_env::{
 use mackrl_sc2::adapter::StarCraft2;
 
 use super::worlds::{StarCraftWorlds, simulated};
-use crate::{args::PlayArgs, failure::Failure, output};
+use crate::{args::PlayArgs, output};
 
 /// Plays one episode, writes the game's replay, and says how it went.
 pub(crate) fn play_one(
@@ -18,18 +18,11 @@ pub(crate) fn play_one(
     policy: ScriptedPolicy,
     key: EpisodeKey,
 ) -> anyhow::Result<()> {
-    if args.svg.is_some() {
-        let message = "--svg draws battles of the simulator; with --env sc2, --record writes the game's own replay";
-        return Err(Failure::Usage {
-            message: message.to_owned(),
-        }
-        .into());
-    }
     let worlds = StarCraftWorlds::default();
     let mut environment = worlds.star_craft(map)?;
     environment.keep_replays();
     let steps = play(&mut environment, map, policy, key)?;
-    if let Some(file) = &args.record {
+    if let Some(file) = &args.save_replay {
         let replay = environment
             .take_replay()
             .context("the game gave no replay")?;
