@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::Context;
 use mackrl::{
+    config::Engine,
     policy::Behaviour,
     replay::record_policy,
     training::{Episodes, Evaluation, evaluate_in},
@@ -33,6 +34,13 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
             args.save_replays
         );
         return Err(Failure::Usage { message }.into());
+    }
+    if args.save_replays > 0 && run.config.env.engine == Engine::Sc2 {
+        let message = "--save-replays plays episodes again in the simulator, but this run is one of StarCraft II";
+        return Err(Failure::Usage {
+            message: message.to_owned(),
+        }
+        .into());
     }
     let chosen = Episodes {
         count: episodes,

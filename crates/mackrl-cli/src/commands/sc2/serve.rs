@@ -6,10 +6,14 @@ use std::{
 };
 
 use anyhow::Context;
+use mackrl::{
+    config::EnvironmentConfig,
+    replay::{Player, Replay, Step},
+};
 use mackrl_env::skirmish::UnitData;
 use mackrl_sc2::{
     lifetime::end_with_parent,
-    stand_in::{GameArguments, StandIn, StandInOptions, faults::FaultPlan},
+    stand_in::{EpisodeRecord, GameArguments, StandIn, StandInOptions, faults::FaultPlan},
 };
 
 use crate::{
@@ -27,13 +31,14 @@ pub(super) fn run(args: &ServeArgs) -> anyhow::Result<()> {
         .transpose();
     let faults = faults.map_err(|error| usage(&error))?;
     let address = address(args)?;
+    let units = match args.units {
+        UnitsChoice::Liberty => UnitData::Liberty,
+        UnitsChoice::Lotv => UnitData::Lotv,
+    };
     let options = StandInOptions {
-        units: match args.units {
-            UnitsChoice::Liberty => UnitData::Liberty,
-            UnitsChoice::Lotv => UnitData::Lotv,
-        },
+        units,
         seed: args.seed.unwrap_or(process),
-        replays: None,
+        replays: Some(Box::new(move |record| Ok(replay(record, units).to_bytes()))),
         faults: faults.map(|plan| plan.of_process(process)),
     };
     let server =
@@ -45,6 +50,28 @@ pub(super) fn run(args: &ServeArgs) -> anyhow::Result<()> {
     server
         .serve(|error| say(&format!("a client was cut off: {error}\n")))
         .context("cannot accept clients")
+}
+
+/// What a client did, as a replay that `mackrl replay` plays.
+fn replay(record: &EpisodeRecord, units: UnitData) -> Replay {
+    let mut env = EnvironmentConfig {
+        map: record.map.clone(),
+        ..EnvironmentConfig::default()
+    };
+    env.settings.units = units;
+    let steps = record.steps.iter().map(|(actions, hash)| Step {
+        actions: actions.clone(),
+        state_hash: format!("{hash:016x}"),
+        value: None,
+        thought: None,
+    });
+    Replay {
+        program: env!("CARGO_PKG_VERSION").to_owned(),
+        env,
+        key: record.key,
+        player: Player::Client,
+        steps: steps.collect(),
+    }
 }
 
 /// Where to listen: what clients pass to the game, or what was typed.
