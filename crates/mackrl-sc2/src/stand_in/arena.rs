@@ -225,7 +225,7 @@ impl EpisodeRecord {
         }
         match actions {
             Ok(actions) if self.steps.len() < RECORDED_STEPS_MAX => {
-                self.steps.push((actions, hash))
+                self.steps.push((actions, hash));
             }
             Ok(_) => self.problem = Some(format!("more than {RECORDED_STEPS_MAX} steps")),
             Err(problem) => self.problem = Some(problem),
