@@ -46,7 +46,9 @@ impl StarCraft2 {
         settings: SkirmishSettings,
         pool: Arc<GamePool>,
     ) -> Result<Self, SkirmishError> {
-        let state = Encounter::new(Arc::clone(&scenario), 0.0).muster().clone();
+        let state = Encounter::new(Arc::clone(&scenario), &settings)
+            .muster()
+            .clone();
         Ok(Self {
             face: Face::new(Arc::clone(&scenario), settings, &state)?,
             pool,
