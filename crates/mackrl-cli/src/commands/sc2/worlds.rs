@@ -12,7 +12,7 @@ use mackrl::{
 };
 use mackrl_env::{
     Environment,
-    skirmish::{Scenario, unit_types::UnitTypes},
+    skirmish::{EnemyBehaviour, Scenario, unit_types::UnitTypes},
 };
 use mackrl_sc2::adapter::{GamePool, GameSettings, Installation, StarCraft2, process::Launcher};
 
@@ -66,6 +66,10 @@ impl Default for StarCraftWorlds {
 impl StarCraftWorlds {
     /// One world, with what only StarCraft II's have.
     pub(super) fn star_craft(&self, config: &EnvironmentConfig) -> Result<StarCraft2, Error> {
+        if config.settings.enemy_order != EnemyBehaviour::Map {
+            let message = "env.enemy_order is `hunt`, expected `map`: enemies in StarCraft II follow the order of their map";
+            return Err(Error::Config(message.to_owned()));
+        }
         let scenario = scenario(config)?;
         let wrong = |error: &dyn std::error::Error| Error::Config(error.to_string());
         StarCraft2::new(scenario, config.settings.clone(), self.pool(config)?)
