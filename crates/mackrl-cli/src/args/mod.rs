@@ -5,6 +5,7 @@ mod configuration;
 mod play;
 mod replay;
 mod runs;
+mod serve;
 
 use std::path::PathBuf;
 
@@ -21,6 +22,7 @@ pub(crate) use configuration::{ConfigurationArgs, read_scenario, with_scenario};
 pub(crate) use play::PlayArgs;
 pub(crate) use replay::{ExplainArgs, ReplayArgs};
 pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, TrainArgs};
+pub(crate) use serve::ServeArgs;
 
 /// Teaches teams to coordinate without communicating, by acting jointly on what they commonly know.
 ///
@@ -48,6 +50,7 @@ pub(crate) enum Command {
     Play(PlayArgs),
     Replay(ReplayArgs),
     Explain(ExplainArgs),
+    Serve(ServeArgs),
     Maps(MapsArgs),
     Config(ConfigArgs),
     Bench(BenchArgs),

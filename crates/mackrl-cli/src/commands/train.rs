@@ -20,7 +20,8 @@ pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<()> {
     let threads = args.threads.count();
     let mut training = Reporting::new(Trainer::new(&config, threads)?, &config);
     let mut folder = RunFolder::create(&path, &config, threads)?;
-    let summary = training_loop::train_into(&mut folder, &mut training, &config, &stop)?;
+    let detail = args.dashboard.detail();
+    let summary = training_loop::train_into(&mut folder, &mut training, &config, &stop, detail)?;
     training_loop::print(&summary, args.json)
 }
 
