@@ -11,7 +11,7 @@ use clap::Args;
 ///
 /// Example: mackrl serve runs
 #[derive(Debug, Args)]
-pub(crate) struct ServeArgs {
+pub(crate) struct ServeRunsArgs {
     /// Run folders, or folders of run folders
     #[arg(value_name = "DIR", required = true)]
     pub(crate) folders: Vec<PathBuf>,
