@@ -1,7 +1,7 @@
 //! The `mackrl` program: train, evaluate, certify and reproduce.
 //!
 //! This crate holds no algorithm. `args` is what was typed, `commands` what it means, `reproduce` one command for each figure
-//! of the paper, `plot` the drawing of its results, `replay` the looking into recorded episodes, `training_loop` the loop around a trainer,
+//! of the paper, `plot` the drawing of its results, `replay` the looking into recorded episodes, `serve` runs in the browser, `training_loop` the loop around a trainer,
 //! `run_folder` what a run leaves on disk, `provenance` where a result comes from,
 //! `progress` what a person sees while waiting, `signals` how a person stops waiting, `failure` the one place that turns errors into exit codes. Data go to stdout, everything else to stderr.
 
@@ -16,6 +16,7 @@ mod provenance;
 mod replay;
 mod reproduce;
 mod run_folder;
+mod serve;
 mod signals;
 mod training_loop;
 
@@ -36,6 +37,7 @@ fn main() -> ExitCode {
         Command::Play(args) => commands::play::run(&args),
         Command::Replay(args) => commands::replay::run(&args),
         Command::Explain(args) => commands::explain::run(&args),
+        Command::Serve(args) => commands::serve::run(&args),
         Command::Maps(args) => commands::maps::run(&args),
         Command::Config(args) => commands::config::run(&args),
         Command::Bench(args) => commands::bench::run(&args),

@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::{
     failure::Failure,
     output,
-    progress::{Progress, Standing},
+    progress::{Detail, Progress, Standing},
     provenance::Provenance,
     run_folder::{RunFolder, Status},
     signals::StopRequest,
@@ -133,7 +133,8 @@ pub(crate) struct Summary {
     steps_per_s: f64,
 }
 
-/// Trains to the end, or until asked to stop, and keeps metrics, checkpoints, status and weights in `folder`.
+/// Trains to the end, or until asked to stop, and keeps metrics, checkpoints, status and weights in `folder`; the
+/// person who waits is shown as much as `detail` says.
 ///
 /// # Errors
 /// [`Failure::Interrupted`] when asked to stop, after a checkpoint; otherwise what went wrong.
@@ -142,8 +143,9 @@ pub(crate) fn train_into(
     training: &mut impl Training,
     config: &Config,
     stop: &StopRequest,
+    detail: Detail,
 ) -> anyhow::Result<Summary> {
-    let mut progress = Progress::new(training.standing().steps_env);
+    let mut progress = Progress::new(training.standing().steps_env, detail);
     let outcome = train(folder, training, config, stop, &mut progress);
     progress.finish();
     let recorded = folder.set_status(match &outcome {
@@ -180,6 +182,7 @@ fn train(
         let Update { metrics, standing } = training.update()?;
         if let Some(metrics) = metrics {
             folder.append_metrics(&metrics)?;
+            progress.hear(&metrics);
         }
         progress.show(&standing);
         if standing.steps_env / interval > intervals {
@@ -278,7 +281,7 @@ mod tests {
         config.run.checkpoint_interval_steps_env = 2;
         let mut folder = RunFolder::create(&path, &config, 1).unwrap();
         let stop = training.stop.clone();
-        let outcome = train_into(&mut folder, &mut training, &config, &stop);
+        let outcome = train_into(&mut folder, &mut training, &config, &stop, Detail::Line);
         (parent, path, outcome)
     }
 

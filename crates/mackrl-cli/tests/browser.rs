@@ -4,7 +4,13 @@
 //! `.ci/run browser` installs Chromium if it is missing and runs these tests; a plain `cargo test` leaves them out, visibly.
 //! Set `CHROMIUM` to use another browser of its family.
 
-use std::{collections::BTreeSet, env, fs, path::Path, process::Command};
+use std::{
+    collections::BTreeSet,
+    env, fs,
+    io::{BufRead, BufReader},
+    path::Path,
+    process::{Command, Stdio},
+};
 
 use assert_cmd::cargo::cargo_bin;
 use mackrl::replay::{GroupKnowledge, Playback, Replay};
@@ -59,6 +65,15 @@ fn drive(folder: &Path, html: &str, script: &str, width: u32) -> Vec<String> {
         "{page}<script>{HANDS}try {{ {script} }} catch (error) {{ problems.push(`error: ${{error.stack}}`); finish(); }}</script></body>{end}"
     );
     fs::write(&driven, text).expect("the folder can be written");
+    let dom = browse(folder, &format!("file://{}", driven.display()), width);
+    let result = dom.split_once("<pre id=\"result\">begin\n");
+    let result = result.and_then(|(_, rest)| rest.split_once("\nend</pre>"));
+    let (result, _) = result.unwrap_or_else(|| panic!("the page did not finish: {dom}"));
+    result.lines().map(str::to_owned).collect()
+}
+
+/// The document at an address once its scripts have run for twenty seconds of the page's time.
+fn browse(folder: &Path, address: &str, width: u32) -> String {
     let browser = env::var("CHROMIUM").unwrap_or_else(|_| "chromium".to_owned());
     let output = Command::new(&browser)
         .args(["--headless", "--no-sandbox", "--disable-gpu", "--dump-dom"])
@@ -68,19 +83,12 @@ fn drive(folder: &Path, html: &str, script: &str, width: u32) -> Vec<String> {
             "--user-data-dir={}",
             folder.join("browser").display()
         ))
-        .arg(format!("file://{}", driven.display()))
+        .arg(address)
         .output()
         .unwrap_or_else(|error| {
             panic!("cannot start {browser}: {error}; `.ci/run browser` installs it")
         });
-    let dom = String::from_utf8_lossy(&output.stdout).into_owned();
-    let result = dom.split_once("<pre id=\"result\">begin\n");
-    let result = result.and_then(|(_, rest)| rest.split_once("\nend</pre>"));
-    let (result, _) = result.unwrap_or_else(|| {
-        let says = String::from_utf8_lossy(&output.stderr);
-        panic!("the page did not finish: {says}\n{}", dom.len())
-    });
-    result.lines().map(str::to_owned).collect()
+    String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
 /// A folder with the page and the playback of an untrained team's battle.
@@ -284,5 +292,38 @@ fn what_a_stranger_wrote_is_shown_and_not_run() {
             format!("title|{}", title.len()),
             "images|0|undefined".to_owned()
         ]
+    );
+}
+
+#[test]
+#[ignore = "needs chromium; run by `.ci/run browser`"]
+fn served_runs_are_drawn_with_their_replays() {
+    let folder = tempfile::tempdir().expect("a folder for the story");
+    team(folder.path(), "3m");
+    let mut server = Command::new(cargo_bin("mackrl"))
+        .args(["serve", "run", "--port", "0"])
+        .current_dir(folder.path())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    let mut address = String::new();
+    let stdout = server.stdout.take().expect("stdout is read");
+    BufReader::new(stdout)
+        .read_line(&mut address)
+        .expect("it says where it is");
+    let dom = browse(folder.path(), address.trim(), 1280);
+    let replay = format!("{}runs/0/replays/seed1-episode0.replay.gz", address.trim());
+    let page = browse(folder.path(), &replay, 1280);
+    server.kill().and_then(|()| server.wait()).expect("it ends");
+    assert!(dom.contains("finished, "), "its status: {dom}");
+    assert!(
+        dom.contains("href=\"/runs/0/replays/seed1-episode0.replay.gz\""),
+        "its replay: {dom}"
+    );
+    let plots = dom.matches("<section class=\"plot\">").count();
+    assert!(plots >= 6, "{plots} plots");
+    assert!(
+        page.contains("<h1 id=\"title\">3m by mackrl, greedy</h1>"),
+        "the replay's page"
     );
 }

@@ -130,7 +130,7 @@ fn a_trained_team_s_replay_explains_every_step() {
     let folder = folder.path();
     succeeds(
         folder,
-        "train --map 3m --steps 100 --out run --set test.episodes=2",
+        "train --map 3m --steps 100 --out run --set test.episodes=2 --dashboard",
     );
     let error = fails(folder, "evaluate run --episodes 2 --save-replays 3", 2);
     assert!(error.contains("--save-replays 3 of 2 episodes"), "{error}");

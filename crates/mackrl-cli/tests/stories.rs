@@ -62,6 +62,7 @@ fn help_teaches_every_command() {
         "play",
         "replay",
         "explain",
+        "serve",
         "maps",
         "config",
         "bench",

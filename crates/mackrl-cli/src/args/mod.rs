@@ -6,6 +6,7 @@ mod play;
 mod replay;
 mod runs;
 mod sc2;
+mod serve;
 
 use std::path::PathBuf;
 
@@ -26,6 +27,7 @@ pub(crate) use sc2::{
     DoctorArgs, ExecGameArgs, InstallArgs, KillArgs, PsArgs, RecordArgs, Sc2Args, Sc2Command,
     ServeArgs, UnitsChoice,
 };
+pub(crate) use serve::ServeRunsArgs;
 
 /// Teaches teams to coordinate without communicating, by acting jointly on what they commonly know.
 ///
@@ -53,6 +55,7 @@ pub(crate) enum Command {
     Play(PlayArgs),
     Replay(ReplayArgs),
     Explain(ExplainArgs),
+    Serve(ServeRunsArgs),
     Maps(MapsArgs),
     Config(ConfigArgs),
     Bench(BenchArgs),

@@ -1,6 +1,9 @@
 //! `mackrl evaluate`: how well a trained team plays.
 
-use std::path::Path;
+use std::{
+    io::{self, Write},
+    path::Path,
+};
 
 use anyhow::Context;
 use mackrl::{
@@ -75,6 +78,12 @@ fn save_replays(folder: &Path, run: &Run, seed: u64, count: usize) -> anyhow::Re
         output::write_file(&file, &replay.to_bytes())?;
         meter.report(episode + 1, count);
     }
+    // The replays are there, whether anybody reads this or not.
+    let _ = writeln!(
+        io::stderr(),
+        "{count} replays are in {}: see `mackrl replay FILE --html OUT`",
+        replays.display()
+    );
     Ok(())
 }
 

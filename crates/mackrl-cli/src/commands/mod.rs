@@ -12,4 +12,5 @@ pub(crate) mod replay;
 pub(crate) mod reproduce;
 pub(crate) mod resume;
 pub(crate) mod sc2;
+pub(crate) mod serve;
 pub(crate) mod train;

@@ -37,6 +37,7 @@ pub(crate) fn run(args: &ResumeArgs) -> anyhow::Result<()> {
         trainer.restore(&checkpoint)?;
     }
     let mut training = Reporting::new(trainer, &config);
-    let summary = training_loop::train_into(&mut folder, &mut training, &config, &stop)?;
+    let detail = args.dashboard.detail();
+    let summary = training_loop::train_into(&mut folder, &mut training, &config, &stop, detail)?;
     training_loop::print(&summary, args.json)
 }

@@ -24,7 +24,8 @@ pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<()> {
         &config,
     );
     let mut folder = RunFolder::create(&path, &config, threads)?;
-    let summary = training_loop::train_into(&mut folder, &mut training, &config, &stop)?;
+    let detail = args.dashboard.detail();
+    let summary = training_loop::train_into(&mut folder, &mut training, &config, &stop, detail)?;
     training_loop::print(&summary, args.json)
 }
 

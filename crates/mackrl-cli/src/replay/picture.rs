@@ -28,7 +28,7 @@ pub(crate) fn picture(opened: &Opened, step: usize, group: &[AgentId]) -> Battle
     let terrain = &scenario.field.terrain;
     let cells = 0..i32::try_from(MAP_SIZE).unwrap_or(i32::MAX);
     let rewards = playback.reward_t.iter().take(step);
-    let total: f64 = rewards.map(|reward| f64::from(*reward)).sum();
+    let total = rewards.fold(0.0, |total, reward| total + f64::from(*reward));
     BattlePicture {
         title: format!("{}, step {step}", playback.skirmish.spec().name),
         subtitle: format!(

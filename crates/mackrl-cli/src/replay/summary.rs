@@ -40,9 +40,7 @@ impl Summary {
             seed: replay.key.seed,
             episode: replay.key.episode,
             battle_won,
-            total: (playback.reward_t.iter())
-                .map(|reward| f64::from(*reward))
-                .sum(),
+            total: (playback.reward_t.iter()).fold(0.0, |total, reward| total + f64::from(*reward)),
             ep_length: playback.steps(),
             dead_allies,
             dead_enemies,

@@ -155,6 +155,9 @@ impl Playback {
                 spec.actions
             ));
         }
+        if let Some(number) = numbers_that_cannot_be(step) {
+            return Some(number);
+        }
         let is_chosen = match thought.chosen {
             Some(chosen) => chosen < thought.partitions.len(),
             None => thought.partitions.is_empty(),
@@ -188,4 +191,28 @@ impl Playback {
             Err(Problem::Differs(hash))
         }
     }
+}
+
+/// A number in the step's thought that is no probability, or a value that is no number.
+fn numbers_that_cannot_be(step: &Step) -> Option<String> {
+    /// What sums of rounded numbers may be more than 1.
+    const ROUNDING: f64 = 1e-3;
+    let thought = step.thought.as_ref()?;
+    if step.value.is_some_and(|value| !value.is_finite()) {
+        return Some("a value that is not finite".to_owned());
+    }
+    let partitions = thought.partitions.iter();
+    let partitions = partitions.flat_map(|partition| [partition.probability, partition.posterior]);
+    let pairs = thought.pairs.iter().flat_map(|pair| {
+        let joint = pair.joint.iter().map(|option| option.probability);
+        joint.chain([pair.delegate, pair.posterior_joint, pair.posterior_delegate])
+    });
+    let options = thought.agents.iter().flat_map(|agent| &agent.options);
+    let options = options.map(|option| option.probability);
+    let ways = [thought.log_p_path.exp(), thought.log_p.exp()];
+    let numbers = partitions.chain(pairs).chain(options).map(f64::from);
+    let wrong = numbers
+        .chain(ways)
+        .find(|number| !(0.0..=1.0 + ROUNDING).contains(number))?;
+    Some(format!("probability {wrong}, expected a number in [0, 1]"))
 }

@@ -1,5 +1,7 @@
 //! Episodes that are played in order to be kept.
 
+use std::{ffi::OsStr, path::Path};
+
 use mackrl_env::{
     Action, Environment, EpisodeKey, Observations,
     registry::MATRIX_GAME,
@@ -128,6 +130,17 @@ impl Watched {
     }
 }
 
+/// The world, with a scenario's file by its name alone: where it lies on this machine concerns nobody.
+fn without_folder(env: &EnvironmentConfig) -> EnvironmentConfig {
+    let mut env = env.clone();
+    if !env.scenario.is_empty()
+        && let Some(name) = Path::new(&env.map).file_name().and_then(OsStr::to_str)
+    {
+        env.map = name.to_owned();
+    }
+    env
+}
+
 /// The critic's value, and what the controllers computed, of a team that has them.
 type Chosen = (Option<f32>, Option<Thought>);
 
@@ -142,7 +155,7 @@ fn record(
     let mut actions = vec![Action::default(); skirmish.spec().agents];
     let mut replay = Replay {
         program: env!("CARGO_PKG_VERSION").to_owned(),
-        env: env.clone(),
+        env: without_folder(env),
         key,
         player,
         steps: Vec::new(),

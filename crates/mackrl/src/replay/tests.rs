@@ -187,7 +187,7 @@ fn what_a_stranger_changed_is_found_out() {
         matches!(error, ReplayError::Differs { step: 3, .. }),
         "{error}"
     );
-    let cases: [(&str, &str, &str); 6] = [
+    let cases: [(&str, &str, &str); 7] = [
         (
             "\"actions\":[",
             "\"actions\":[77,",
@@ -214,6 +214,11 @@ fn what_a_stranger_changed_is_found_out() {
             "step 1: agent 60000, expected less than 3",
         ),
         ("\"steps\":", "\"steps\":1", "expected 1"),
+        (
+            "\"delegate\":",
+            "\"delegate\":7",
+            "expected a number in [0, 1]",
+        ),
     ];
     for (from, to, expected) in cases {
         let error = error_after(&replay, |text| {
@@ -240,4 +245,46 @@ fn a_bomb_is_not_unpacked() {
     text.extend(std::iter::repeat_n(' ', 300 << 20));
     let error = Replay::from_bytes(&packed(&text)).unwrap_err();
     assert!(error.to_string().contains("no replay of mackrl"), "{error}");
+}
+
+#[test]
+fn whatever_a_stranger_changes_nothing_panics() {
+    let replay = sampled(&[]);
+    let text = unpacked(&replay.to_bytes());
+    let key = EpisodeKey::new(1, Stream::Other, 0);
+    let mut refused = 0;
+    for trial in 0..200 {
+        let [place, byte] = [0, 1].map(|draw| key.bits(trial, mackrl_env::Draw::World(draw)));
+        let mut bytes = text.clone().into_bytes();
+        let place = usize::try_from(place % bytes.len() as u64).unwrap();
+        bytes[place] = b"0123456789-,:[]{}\"x"[usize::try_from(byte % 19).unwrap()];
+        let changed = String::from_utf8(bytes).unwrap();
+        let outcome = Replay::from_bytes(&packed(&changed)).and_then(|replay| replay.play());
+        refused += usize::from(outcome.is_err());
+    }
+    assert!(refused > 50, "{refused} of 200 are refused");
+}
+
+#[test]
+fn in_figure_1_two_agents_commonly_know_what_both_see_and_the_third_stands_apart() {
+    let mut env = EnvironmentConfig {
+        map: "folder/figure1.toml".to_owned(),
+        scenario: include_str!("../../../../examples/scenarios/figure1.toml").to_owned(),
+        ..EnvironmentConfig::default()
+    };
+    (env.settings.sight_range, env.settings.shoot_range) = (6.0, 4.0);
+    let key = EpisodeKey::new(1, Stream::Other, 0);
+    let replay = record_script(&env, ScriptedPolicy::Idle, key).unwrap();
+    assert_eq!(replay.env.map, "figure1.toml", "no folder of this machine");
+    let playback = replay.play().unwrap();
+    let names = Names::new(&playback.skirmish);
+    let known = |set: EntitySet| -> Vec<String> { set.iter().map(|e| names.entity(e)).collect() };
+    let [a, b, c] = [0, 1, 2].map(AgentId::new);
+    let pair = playback.knowledge(0, &[a, b]);
+    assert_eq!(known(pair.common), ["A", "B", "e0", "e1"]);
+    let private: Vec<_> = pair.private.iter().map(|p| known(p.entities)).collect();
+    assert_eq!(private, [["e2"], ["e4"]]);
+    let apart = playback.knowledge(0, &[b, c]);
+    assert!(apart.common.is_empty(), "{apart:?}");
+    assert_eq!(known(apart.mutual), ["e1", "e2"]);
 }

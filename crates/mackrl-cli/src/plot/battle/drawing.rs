@@ -95,15 +95,16 @@ impl<'a> Drawing<'a> {
             shapes.extend(cross(self.place(dead.at), 0.28 * self.unit));
         }
         shapes.extend(self.living().filter_map(|figure| self.trail(figure)));
-        shapes.extend(self.picture.links.iter().flat_map(|pair| self.link(*pair)));
-        shapes.extend(self.picture.shots.iter().flat_map(|shot| self.shot(*shot)));
         if let Some(lens) = &self.picture.lens {
             shapes.extend(lens::rings(self, lens));
         }
+        shapes.extend(self.picture.shots.iter().flat_map(|shot| self.shot(*shot)));
         for figure in self.living() {
             let radius = figure.radius * self.unit;
             shapes.extend(body(self.place(figure.at), figure, radius));
         }
+        // Over the bodies, so that a melee hides none.
+        shapes.extend(self.picture.links.iter().flat_map(|pair| self.link(*pair)));
         for missile in &self.picture.missiles {
             shapes.push(filled(&circle(self.place(*missile), 3.6, 16), PAPER, 1.0));
             shapes.push(filled(&circle(self.place(*missile), 2.6, 16), INK, 1.0));
@@ -131,12 +132,15 @@ impl<'a> Drawing<'a> {
             .collect()
     }
 
-    /// The bond of two agents that were paired.
+    /// The band between two agents that were paired, from body to body.
     fn link(&self, pair: Link) -> Vec<Shape> {
-        let ends = pair
-            .members
-            .map(|index| self.place(self.picture.figures[index].at));
-        link(ends, pair.is_joint)
+        let members = pair.members.map(|index| &self.picture.figures[index]);
+        let [from, to] = members.map(|figure| self.place(figure.at));
+        let length = (to[0] - from[0]).hypot(to[1] - from[1]).max(1.0);
+        let along = |part: f64| [0, 1].map(|axis| from[axis] + part * (to[axis] - from[axis]));
+        let [first, last] =
+            members.map(|figure| (0.62 * figure.radius * self.unit / length).min(0.4));
+        link([along(first), along(1.0 - last)], pair.is_joint)
     }
 
     /// Where a unit came from in this step.

@@ -13,6 +13,8 @@ use crate::plot::{
 const SURROUNDINGS: f64 = 3.0;
 /// Least cells shown along x and along y.
 const WINDOW_MIN: [usize; 2] = [18, 12];
+/// Most cells along x and along y at which whole fields of view are shown.
+const FIELDS_WITHIN: [f64; 2] = [26.0, 22.0];
 const GROUND: Colour = Colour(0xF4, 0xF1, 0xEA);
 const GRID: Colour = Colour(0xE6, 0xE1, 0xD6);
 pub(super) const WALL: Colour = Colour(0xC9, 0xC4, 0xB8);
@@ -22,15 +24,32 @@ pub(super) const WALL: Colour = Colour(0xC9, 0xC4, 0xB8);
 pub(super) struct Window([[usize; 2]; 2]);
 
 impl Window {
-    /// The cells about all units, and about the places that have to be seen.
+    /// The cells about all units and about the places that have to be seen; the lens's fields of view too, where there is room.
     pub(super) fn around(picture: &BattlePicture) -> Self {
+        let figures = picture.figures.iter().map(|figure| figure.at);
+        let places = figures.chain(picture.ground_shown.iter().copied());
+        let units: Vec<_> = places.map(|at| (at, SURROUNDINGS)).collect();
+        let lens = picture.lens.iter().flat_map(|lens| &lens.fields);
+        let fields = lens.map(|index| (picture.figures[*index].at, picture.sight + 0.5));
+        let whole = Self::about(units.iter().copied().chain(fields), picture.edge);
+        let [columns, rows] = whole.size();
+        if columns <= FIELDS_WITHIN[0] && rows <= FIELDS_WITHIN[1] {
+            whole
+        } else {
+            Self::about(units.into_iter(), picture.edge)
+        }
+    }
+
+    /// The cells about some places, each with how far about it.
+    fn about(places: impl Iterator<Item = ([f64; 2], f64)> + Clone, edge: usize) -> Self {
         Self([0, 1].map(|axis| {
-            let figures = picture.figures.iter().map(|figure| figure.at[axis]);
-            let others = picture.ground_shown.iter().map(|at| at[axis]);
-            let places: Vec<f64> = figures.chain(others).collect();
-            let first = places.iter().copied().fold(f64::INFINITY, f64::min) - SURROUNDINGS;
-            let last = places.iter().copied().fold(f64::NEG_INFINITY, f64::max) + SURROUNDINGS;
-            cells([first, last], WINDOW_MIN[axis], picture.edge)
+            let first = places.clone().map(|(at, about)| at[axis] - about);
+            let last = places.clone().map(|(at, about)| at[axis] + about);
+            let ends = [
+                first.fold(f64::INFINITY, f64::min),
+                last.fold(f64::NEG_INFINITY, f64::max),
+            ];
+            cells(ends, WINDOW_MIN[axis], edge)
         }))
     }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{
     BattlePicture, Figure, INK, Side,
     drawing::wedge,
-    lens::{COMMON, OTHER},
+    lens::{APART, COMMON, OTHER},
     marks::{bar, body, circle, closed, closed_dashed, cross, filled, link, moved, open, words},
 };
 use crate::plot::{
@@ -110,6 +110,14 @@ fn knowledge(picture: &BattlePicture) -> Vec<Entry> {
     let members = members.join(", ");
     let field = vec![filled(&disc, blue, 0.12), closed(&disc, blue, 1.6)];
     entries.push(entry(16.0, &format!("seen by {members}"), field));
+    if lens
+        .fields
+        .iter()
+        .any(|index| !lens.members.contains(index))
+    {
+        let field = vec![filled(&disc, APART, 0.06), closed_dashed(&disc, APART, 1.4)];
+        entries.push(entry(16.0, "seen by another agent", field));
+    }
     let common = vec![filled(&disc, COMMON, 0.28), closed(&disc, COMMON, 2.4)];
     let meaning = format!("common knowledge of {members}");
     entries.push(entry(16.0, &meaning, common));

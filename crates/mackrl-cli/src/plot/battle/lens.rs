@@ -12,7 +12,7 @@ pub(super) const COMMON: Colour = Colour::GREEN;
 /// Of what only some see.
 pub(super) const OTHER: Colour = Colour::ORANGE;
 /// Of the fields of view of agents that are not in the group.
-const APART: Colour = Colour(0x8A, 0x86, 0x7C);
+pub(super) const APART: Colour = Colour(0x8A, 0x86, 0x7C);
 
 /// The fields of view, lightly filled: full edges for the group, dashed for others.
 pub(super) fn fields(drawing: &Drawing<'_>, lens: &Lens) -> Vec<Shape> {

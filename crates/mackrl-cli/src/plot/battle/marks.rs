@@ -149,13 +149,15 @@ pub(super) fn closed_dashed(points: &[[f64; 2]], colour: Colour, width: f64) -> 
 
 /// What binds two agents that were paired: a broad band if they acted jointly, dashes if they delegated.
 pub(super) fn link(ends: [[f64; 2]; 2], is_joint: bool) -> Vec<Shape> {
+    let casing = open(&ends, PAPER, 9.0, false);
     if is_joint {
         return vec![
+            casing,
             open(&ends, Colour::GREEN, 7.0, false),
-            open(&ends, PAPER, 2.4, false),
+            open(&ends, PAPER, 2.2, false),
         ];
     }
-    vec![open(&ends, Colour::PURPLE, 3.0, true)]
+    vec![casing, open(&ends, Colour::PURPLE, 4.0, true)]
 }
 
 /// The name of a unit, above it and to the right.

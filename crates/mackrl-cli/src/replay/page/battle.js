@@ -104,18 +104,25 @@ function drawFields(time) {
 
 function line(from, to) { pen.beginPath(); pen.moveTo(...from); pen.lineTo(...to); pen.stroke(); }
 
-/** The pairs of the partition in force. */
+/** The pairs of the partition in force: bands from body to body, over the bodies so that a melee hides none. */
 function drawLinks(time) {
   const decision = data.decisions[Math.floor(time)];
   if (!decision) return;
   for (const pair of decision.pairs) {
     if (!pair.choice) continue;
-    const [from, to] = pair.members.map((agent) => placeOf(agent, time));
+    const centres = pair.members.map((agent) => placeOf(agent, time));
+    const length = Math.hypot(centres[1][0] - centres[0][0], centres[1][1] - centres[0][1]) || 1;
+    const trimmed = (end) => {
+      const part = Math.min(0.4, 0.62 * data.entities[pair.members[end]].radius * scale.unit / length);
+      return [0, 1].map((axis) => centres[end][axis] + part * (centres[1 - end][axis] - centres[end][axis]));
+    };
+    const [from, to] = [trimmed(0), trimmed(1)];
+    pen.strokeStyle = colours.card; pen.lineWidth = 9; line(from, to);
     if (pair.choice === "joint") {
       pen.strokeStyle = colours.common; pen.lineWidth = 7; line(from, to);
-      pen.strokeStyle = colours.ground; pen.lineWidth = 2.4; line(from, to);
+      pen.strokeStyle = colours.card; pen.lineWidth = 2.2; line(from, to);
     } else {
-      pen.strokeStyle = colours.private; pen.lineWidth = 3; pen.setLineDash([7, 5]); line(from, to); pen.setLineDash([]);
+      pen.strokeStyle = colours.private; pen.lineWidth = 4; pen.setLineDash([6, 4]); line(from, to); pen.setLineDash([]);
     }
   }
 }
@@ -194,7 +201,7 @@ function drawCooldown(x, y, radius, share) {
 }
 
 function drawName(entity, time) {
-  if (scale.unit < 17 && !current.group.includes(entity)) return;
+  if (scale.unit < 21 && !current.group.includes(entity)) return;
   const { name, radius: size } = data.entities[entity];
   const [middle, centre] = placeOf(entity, time), radius = Math.max(size * scale.unit, 5);
   const x = middle + 0.75 * radius + 1, y = centre - 0.8 * radius - 1;
@@ -218,10 +225,10 @@ function draw(time) {
   drawGround();
   drawFields(time);
   data.entities.forEach((_, entity) => { if (!isAlive(step, entity)) drawFallen(entity, time); });
-  drawLinks(time);
-  drawShots(time);
   drawRings(time);
+  drawShots(time);
   data.entities.forEach((_, entity) => { if (isAlive(step, entity)) drawBody(entity, time); });
+  drawLinks(time);
   data.entities.forEach((_, entity) => { if (isAlive(step, entity)) drawName(entity, time); });
   pen.fillStyle = colours.ink;
   for (const [x, y] of data.frames[step].missiles) { circle(toX(x), toY(y), 2.6); pen.fill(); }

@@ -1,0 +1,108 @@
+//! Runs in the browser, on this machine alone, updating as they go.
+//!
+//! A small server of our own on the standard library: it binds the loopback interface, answers GET, reads a bounded head of
+//! a request and never a body, and refuses hosts other than this machine's, so that no page of another site can read along. It
+//! only reads run folders. A web framework would bring a hundred crates for five addresses.
+
+mod http;
+mod runs;
+
+use std::{
+    net::{Ipv4Addr, TcpListener, TcpStream},
+    path::PathBuf,
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+    },
+    time::Duration,
+};
+
+use anyhow::Context;
+
+use crate::{
+    output,
+    replay::{Opened, page},
+    serve::{
+        http::{Request, Response},
+        runs::Served,
+    },
+};
+
+const PAGE: &str = include_str!("page.html");
+/// Longest that a browser may take to ask or to listen.
+const PATIENCE: Duration = Duration::from_secs(10);
+/// Most connections at once.
+const CONNECTIONS_MOST: usize = 32;
+
+/// Serves the runs in `folders` until the program is stopped; port 0 takes any that is free.
+///
+/// # Errors
+/// If the port cannot be had.
+pub(crate) fn serve(folders: &[PathBuf], port: u16) -> anyhow::Result<()> {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))
+        .with_context(|| format!("cannot listen on 127.0.0.1:{port}"))?;
+    let port = listener
+        .local_addr()
+        .context("a listener has a port")?
+        .port();
+    output::print(&format!("http://127.0.0.1:{port}/\n"))?;
+    let served = Arc::new(Served::new(folders));
+    let connections = Arc::new(AtomicUsize::new(0));
+    for stream in listener.incoming() {
+        // Whoever went away before being heard needs no answer.
+        let Ok(stream) = stream else { continue };
+        if connections.load(Ordering::Relaxed) >= CONNECTIONS_MOST {
+            continue;
+        }
+        let (served, connections) = (Arc::clone(&served), Arc::clone(&connections));
+        connections.fetch_add(1, Ordering::Relaxed);
+        std::thread::spawn(move || {
+            // A browser that hangs up loses its answer, and nobody else does.
+            let _ = answer(&stream, &served, port);
+            connections.fetch_sub(1, Ordering::Relaxed);
+        });
+    }
+    Ok(())
+}
+
+fn answer(stream: &TcpStream, served: &Served, port: u16) -> std::io::Result<()> {
+    stream.set_read_timeout(Some(PATIENCE))?;
+    stream.set_write_timeout(Some(PATIENCE))?;
+    let response = match Request::read(stream) {
+        Ok(request) if !request.is_for(port) => Response::error(403, "only this machine is served"),
+        Ok(request) => route(&request.path, served),
+        Err(refusal) => refusal,
+    };
+    response.write(stream)
+}
+
+/// What stands at an address.
+fn route(path: &str, served: &Served) -> Response {
+    let (path, query) = path.split_once('?').unwrap_or((path, ""));
+    let parts: Vec<&str> = path.trim_matches('/').split('/').collect();
+    match parts[..] {
+        [""] => Response::html(PAGE.as_bytes().to_vec()),
+        ["runs.json"] => Response::json(&served.list()),
+        ["runs", run, "metrics.jsonl"] => {
+            let from = query.strip_prefix("from=").unwrap_or("0");
+            let rows = from.parse().ok().and_then(|from| served.metrics(run, from));
+            rows.map_or_else(Response::missing, Response::text)
+        }
+        ["runs", run, "replays", file] => match served.replay(run, file) {
+            Some(path) => replay(&path),
+            None => Response::missing(),
+        },
+        _ => Response::missing(),
+    }
+}
+
+fn replay(path: &std::path::Path) -> Response {
+    let written = Opened::read(path).and_then(|opened| page(&opened, 0));
+    match written {
+        Ok(page) => Response::html(page.into_bytes()),
+        Err(error) => Response::error(500, &format!("{error:#}")),
+    }
+}
+
+#[cfg(test)]
+mod tests;
