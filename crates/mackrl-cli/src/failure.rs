@@ -32,6 +32,12 @@ pub(crate) enum Failure {
     CertificateFailed { mismatches: u64 },
     /// Flags that do not go together.
     Usage { message: String },
+    /// Runs that are not repetitions of one experiment.
+    UnlikeRuns {
+        message: String,
+        /// What can be done.
+        remedy: String,
+    },
     /// A recorded episode that does not play as it did.
     ReplayDiffers { message: String },
 }
@@ -66,6 +72,7 @@ impl fmt::Display for Failure {
             ),
             Self::BadData { message }
             | Self::Usage { message }
+            | Self::UnlikeRuns { message, .. }
             | Self::ReplayDiffers { message } => formatter.write_str(message),
             Self::CertificateFailed { mismatches } => write!(
                 formatter,
@@ -129,7 +136,8 @@ fn exit_of(cause: &(dyn std::error::Error + 'static)) -> Option<Exit> {
             | Failure::UnfinishedRun { .. }
             | Failure::FolderLocked { .. }
             | Failure::NotARun { .. }
-            | Failure::Usage { .. } => Exit::Usage,
+            | Failure::Usage { .. }
+            | Failure::UnlikeRuns { .. } => Exit::Usage,
             Failure::Interrupted { .. } => Exit::Interrupted,
             Failure::BadData { .. } | Failure::ReplayDiffers { .. } => Exit::Data,
             Failure::CertificateFailed { .. } => Exit::CertificateFailed,
@@ -169,6 +177,7 @@ fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
                 "give the folder that `mackrl train` wrote, such as runs/3m-mackrl-seed1"
                     .to_owned(),
             ),
+            Failure::UnlikeRuns { remedy, .. } => Some(remedy.clone()),
             Failure::ReplayDiffers { .. } => Some(
                 "a replay plays the same only in the version of mackrl that recorded it".to_owned(),
             ),

@@ -1,7 +1,7 @@
 //! The `mackrl` program: train, evaluate, certify and reproduce.
 //!
 //! This crate holds no algorithm. `args` is what was typed, `commands` what it means, `reproduce` one command for each figure
-//! of the paper, `plot` the drawing of its results, `training_loop` the loop around a trainer, `run_folder` what a run leaves on disk,
+//! of the paper, `plot` the drawing of its results, `training_loop` the loop around a trainer, `run_folder` what a run leaves on disk, `recorded` the runs that were made earlier,
 //! `progress` what a person sees while waiting, `signals` how a person stops waiting, `failure` the one place that turns errors into exit codes. Data go to stdout, everything else to stderr.
 
 mod args;
@@ -11,6 +11,7 @@ mod failure;
 mod output;
 mod plot;
 mod progress;
+mod recorded;
 mod reproduce;
 mod run_folder;
 mod signals;
@@ -29,6 +30,8 @@ fn main() -> ExitCode {
         Command::Evaluate(args) => commands::evaluate::run(&args),
         Command::Certify(args) => commands::certify::run(&args),
         Command::ExecuteAgent(args) => commands::execute_agent::run(&args),
+        Command::Plot(args) => commands::plot::run(&args),
+        Command::Report(args) => commands::report::run(&args),
         Command::Reproduce(args) => commands::reproduce::run(&args),
         Command::Play(args) => commands::play::run(&args),
         Command::Maps(args) => commands::maps::run(&args),

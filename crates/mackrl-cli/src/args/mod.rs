@@ -1,5 +1,6 @@
 //! What can be typed: the commands and their flags, as text for `--help` and as values for `commands`.
 
+mod analysis;
 mod bench;
 mod configuration;
 mod play;
@@ -10,6 +11,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 use crate::reproduce::{figure5::Figure5Options, figure6::Figure6Options, figure7::Figure7Options};
+pub(crate) use analysis::{CurveStatistic, PlotArgs, ReportArgs};
 pub(crate) use bench::{
     BenchArgs, BenchCommand, BenchEnvironmentArgs, BenchTrainArgs, BenchUpdateArgs,
 };
@@ -39,6 +41,8 @@ pub(crate) enum Command {
     Certify(CertifyArgs),
     #[command(hide = true)]
     ExecuteAgent(ExecuteAgentArgs),
+    Plot(PlotArgs),
+    Report(ReportArgs),
     Reproduce(ReproduceArgs),
     Play(PlayArgs),
     Maps(MapsArgs),

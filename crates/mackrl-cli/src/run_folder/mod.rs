@@ -35,7 +35,7 @@ use manifest::{Fingerprint, Growing};
 pub(crate) use run::Run;
 
 const CONFIG: &str = "config.toml";
-const METRICS: &str = "metrics.jsonl";
+pub(crate) const METRICS: &str = "metrics.jsonl";
 const RUN: &str = "run.json";
 const WEIGHTS: &str = "weights.safetensors";
 const LOCK: &str = "lock";
@@ -261,6 +261,44 @@ impl RunFolder {
     fn replace(&self, name: &str, content: &[u8]) -> anyhow::Result<()> {
         disk::replace(&*self.disk, &self.path.join(name), content)
     }
+}
+
+/// What can be said of a run without its weights.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Description {
+    /// How far it has come.
+    pub(crate) status: Status,
+    /// Versions of the program that made it, in their order.
+    pub(crate) versions: Vec<String>,
+}
+
+/// Whether a run lies in this folder.
+pub(crate) fn is_run(path: &Path) -> bool {
+    path.join(CONFIG).is_file()
+}
+
+/// Reads the configuration of the run at `path`, and what can be said of it.
+///
+/// # Errors
+/// [`Failure::NotARun`] if there is no configuration; otherwise what is wrong with it.
+pub(crate) fn read_description(path: &Path) -> anyhow::Result<(Config, Description)> {
+    let config = run::read_config(path)?;
+    let record = read_record(path);
+    let description = Description {
+        status: record
+            .as_ref()
+            .map_or(Status::Running, |record| record.status),
+        versions: record.map_or_else(Vec::new, |record| vec![record.version]),
+    };
+    Ok((config, description))
+}
+
+/// Puts `content` at `path`: whoever reads there, and whenever power is lost, finds the old content or the new.
+///
+/// # Errors
+/// Path, bytes and what the operating system says; the file that was there is intact then.
+pub(crate) fn replace(path: &Path, content: &[u8]) -> anyhow::Result<()> {
+    disk::replace(&RealDisk, path, content)
 }
 
 /// Takes the folder for this process until the file is closed; the operating system closes it, however the process ends.

@@ -142,10 +142,8 @@ fn suggestion(nearest: Option<&str>) -> String {
 /// The name among `candidates` that is most similar to `name`, if one is similar at all.
 ///
 /// Dotted keys are compared as a whole and by their last part, so that `gama` finds `learner.gamma`.
-pub(super) fn nearest<'a>(
-    name: &str,
-    candidates: impl IntoIterator<Item = &'a str>,
-) -> Option<String> {
+#[must_use]
+pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
     const SIMILAR: f64 = 0.6;
     let last = |key: &str| key.rsplit('.').next().unwrap_or_default().to_owned();
     let similarity = |candidate: &str| {

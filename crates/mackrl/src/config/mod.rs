@@ -28,7 +28,7 @@ mod settings;
 pub use builder::ConfigBuilder;
 pub use choices::{Algorithm, OptimiserKind, PartitionChoice};
 pub use environment::EnvironmentConfig;
-pub use error::{ConfigError, Origin};
+pub use error::{ConfigError, Origin, nearest};
 pub use presets::{Preset, presets};
 pub use sections::{Config, ExplorationConfig, LearnerConfig, PolicyConfig, RunConfig, TestConfig};
 pub use settings::Setting;

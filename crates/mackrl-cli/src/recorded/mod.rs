@@ -1,0 +1,66 @@
+//! Runs that were made earlier, as plots and reports need them: found below some folders, read, grouped into series.
+//!
+//! A run is its configuration and its curves; weights and checkpoints are left alone. Two kinds of record are read: run folders,
+//! and the compact files that `mackrl reproduce` keeps of finished runs. Grouping is strict: runs count as repetitions of one
+//! experiment only if nothing but their seeds differs, and are drawn together only if nothing but the algorithm (and what one
+//! asked to compare) differs as well. Whoever wants to compare apples with pears says `--mix`.
+
+mod curve;
+mod find;
+mod grid;
+mod series;
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use mackrl::config::Config;
+
+use crate::run_folder::{self, Status};
+pub(crate) use curve::{Axis, Measurements, final_mean, share_of};
+pub(crate) use find::find;
+pub(crate) use grid::Gridded;
+pub(crate) use series::{Grouping, Selection, Series, group};
+
+/// A run that was made earlier, or is being made.
+#[derive(Debug, Clone)]
+pub(crate) struct RecordedRun {
+    /// Its folder, or its compact file.
+    pub(crate) path: PathBuf,
+    /// Everything that determines its result.
+    pub(crate) config: Config,
+    /// How far it has come.
+    pub(crate) status: Status,
+    /// Version of the program that made it; several if the run went on with another one.
+    pub(crate) versions: Vec<String>,
+}
+
+impl RecordedRun {
+    /// Reads what is known about the run in a folder.
+    ///
+    /// # Errors
+    /// If the folder holds no run, or one with a configuration that this program does not understand.
+    pub(crate) fn open(path: PathBuf) -> anyhow::Result<Self> {
+        let (config, record) = run_folder::read_description(&path)
+            .with_context(|| format!("cannot use {}", path.display()))?;
+        Ok(Self {
+            path,
+            config,
+            status: record.status,
+            versions: record.versions,
+        })
+    }
+
+    /// Name of what learns, as configurations have it.
+    pub(crate) fn algorithm(&self) -> String {
+        setting(&self.config, "policy.algorithm")
+    }
+}
+
+/// The value at a key, as it is typed.
+pub(crate) fn setting(config: &Config, key: &str) -> String {
+    match config.get(key) {
+        Some(toml::Value::String(text)) => text,
+        Some(value) => value.to_string(),
+        None => String::new(),
+    }
+}
