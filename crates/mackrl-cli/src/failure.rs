@@ -9,6 +9,8 @@ use std::{
 
 use mackrl::config::{Config, ConfigError};
 
+use crate::provenance::CODE;
+
 /// What can go wrong in this program beyond what its libraries say.
 #[derive(Debug)]
 pub(crate) enum Failure {
@@ -28,6 +30,8 @@ pub(crate) enum Failure {
     NotARun { folder: PathBuf },
     /// Stored data that cannot be used.
     BadData { message: String },
+    /// A result of another version of this program, among which results of this one were to stand.
+    OtherCode { path: PathBuf, code: String },
     /// A team that does not run decentralised.
     CertificateFailed { mismatches: u64 },
     /// Flags that do not go together.
@@ -69,6 +73,11 @@ impl fmt::Display for Failure {
                 formatter,
                 "{} is not a run folder: it has no config.toml",
                 folder.display()
+            ),
+            Self::OtherCode { path, code } => write!(
+                formatter,
+                "{} was made by code {code}, expected {CODE}",
+                path.display()
             ),
             Self::BadData { message }
             | Self::Usage { message }
@@ -136,8 +145,9 @@ fn exit_of(cause: &(dyn std::error::Error + 'static)) -> Option<Exit> {
             | Failure::UnfinishedRun { .. }
             | Failure::FolderLocked { .. }
             | Failure::NotARun { .. }
-            | Failure::Usage { .. }
-            | Failure::UnlikeRuns { .. } => Exit::Usage,
+            | Failure::OtherCode { .. }
+            | Failure::UnlikeRuns { .. }
+            | Failure::Usage { .. } => Exit::Usage,
             Failure::Interrupted { .. } => Exit::Interrupted,
             Failure::BadData { .. } | Failure::ReplayDiffers { .. } => Exit::Data,
             Failure::CertificateFailed { .. } => Exit::CertificateFailed,
@@ -178,6 +188,10 @@ fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
                     .to_owned(),
             ),
             Failure::UnlikeRuns { remedy, .. } => Some(remedy.clone()),
+            Failure::OtherCode { .. } => Some(
+                "take such results as they are with --any-code, or choose another folder with --out"
+                    .to_owned(),
+            ),
             Failure::ReplayDiffers { .. } => Some(
                 "a replay plays the same only in the version of mackrl that recorded it".to_owned(),
             ),

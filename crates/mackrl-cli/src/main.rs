@@ -1,7 +1,8 @@
 //! The `mackrl` program: train, evaluate, certify and reproduce.
 //!
 //! This crate holds no algorithm. `args` is what was typed, `commands` what it means, `reproduce` one command for each figure
-//! of the paper, `plot` the drawing of its results, `training_loop` the loop around a trainer, `run_folder` what a run leaves on disk, `recorded` the runs that were made earlier,
+//! of the paper, `plot` the drawing of its results, `training_loop` the loop around a trainer, `run_folder` what a run leaves on disk,
+//! `recorded` the runs that were made earlier, `provenance` where a result comes from,
 //! `progress` what a person sees while waiting, `signals` how a person stops waiting, `failure` the one place that turns errors into exit codes. Data go to stdout, everything else to stderr.
 
 mod args;
@@ -11,6 +12,7 @@ mod failure;
 mod output;
 mod plot;
 mod progress;
+mod provenance;
 mod recorded;
 mod reproduce;
 mod run_folder;

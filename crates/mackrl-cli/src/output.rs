@@ -5,6 +5,8 @@ use std::io::{self, Write};
 use anyhow::Context;
 use serde::Serialize;
 
+use crate::provenance::Provenance;
+
 /// Writes `text` to stdout.
 pub(crate) fn print(text: &str) -> anyhow::Result<()> {
     let mut stdout = io::stdout().lock();
@@ -18,6 +20,14 @@ pub(crate) fn print(text: &str) -> anyhow::Result<()> {
 pub(crate) fn print_json(value: &impl Serialize) -> anyhow::Result<()> {
     let json = serde_json::to_string_pretty(value).context("cannot write the result as JSON")?;
     print(&(json + "\n"))
+}
+
+/// A result with where it comes from; as JSON, one object.
+#[derive(Debug, Serialize)]
+pub(crate) struct Sourced<T> {
+    pub(crate) provenance: Provenance,
+    #[serde(flatten)]
+    pub(crate) result: T,
 }
 
 /// Lays out rows of cells in columns: the first to the left, the others to the right. The first row is the heading.

@@ -10,7 +10,10 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::reproduce::{figure5::Figure5Options, figure6::Figure6Options, figure7::Figure7Options};
+use crate::{
+    provenance::CODE,
+    reproduce::{figure5::Figure5Options, figure6::Figure6Options, figure7::Figure7Options},
+};
 pub(crate) use analysis::{CurveStatistic, PlotArgs, ReportArgs};
 pub(crate) use bench::{
     BenchArgs, BenchCommand, BenchEnvironmentArgs, BenchTrainArgs, BenchUpdateArgs,
@@ -27,7 +30,7 @@ pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, T
 /// Results go to stdout, everything else to stderr. Exit codes: 0 success, 1 a failed certificate, 2 usage, 64 a bad
 /// configuration, 65 bad data, 70 a defect of this program, 74 input or output, 75 stopped by a signal: go on with `mackrl resume`.
 #[derive(Debug, Parser)]
-#[command(name = "mackrl", version, max_term_width = 100)]
+#[command(name = "mackrl", version = CODE, max_term_width = 100)]
 pub(crate) struct Cli {
     #[command(subcommand)]
     pub(crate) command: Command,

@@ -1,11 +1,15 @@
 //! `mackrl evaluate`: how well a trained team plays.
 
 use anyhow::Context;
-use mackrl::training::evaluate;
-use serde::Serialize;
+use mackrl::training::{Evaluation, evaluate};
 use serde_json::Value;
 
-use crate::{args::EvaluateArgs, output, run_folder::Run};
+use crate::{
+    args::EvaluateArgs,
+    output::{self, Sourced},
+    provenance::{Choice, Judgement, Provenance},
+    run_folder::Run,
+};
 
 /// Plays greedy episodes with a trained team and prints how it did.
 pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
@@ -15,13 +19,21 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     let threads = args.threads.count();
     let evaluation = evaluate(&run.config, &run.weights, episodes, seed, threads)
         .with_context(|| format!("cannot evaluate {}", args.run.display()))?;
-    print(&evaluation, args.json)
+    let judgement = Judgement {
+        actions: Choice::Greedy,
+        episodes,
+    };
+    let provenance = Provenance::of_weights(&run.config, &run.weights, seed, judgement);
+    print(provenance, &evaluation, args.json)
 }
 
-/// Prints an evaluation: a JSON object of numbers, or a table in which each mean stands beside its standard error.
-fn print(evaluation: &impl Serialize, json: bool) -> anyhow::Result<()> {
+/// Prints an evaluation: a JSON object of numbers and their provenance, or a table in which each mean stands beside its standard error.
+fn print(provenance: Provenance, evaluation: &Evaluation, json: bool) -> anyhow::Result<()> {
     if json {
-        output::print_json(evaluation)
+        output::print_json(&Sourced {
+            provenance,
+            result: evaluation,
+        })
     } else {
         output::print(&table(&serde_json::to_value(evaluation)?))
     }

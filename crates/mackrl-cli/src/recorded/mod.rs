@@ -15,7 +15,10 @@ use std::path::PathBuf;
 use anyhow::Context;
 use mackrl::config::Config;
 
-use crate::run_folder::{self, Status};
+use crate::{
+    provenance::Provenance,
+    run_folder::{self, Status},
+};
 pub(crate) use curve::{Axis, Measurements, final_mean, share_of};
 pub(crate) use find::find;
 pub(crate) use grid::Gridded;
@@ -30,8 +33,8 @@ pub(crate) struct RecordedRun {
     pub(crate) config: Config,
     /// How far it has come.
     pub(crate) status: Status,
-    /// Version of the program that made it; several if the run went on with another one.
-    pub(crate) versions: Vec<String>,
+    /// Where its results come from: one entry for each version of the program that went on with it.
+    pub(crate) provenance: Vec<Provenance>,
 }
 
 impl RecordedRun {
@@ -40,13 +43,13 @@ impl RecordedRun {
     /// # Errors
     /// If the folder holds no run, or one with a configuration that this program does not understand.
     pub(crate) fn open(path: PathBuf) -> anyhow::Result<Self> {
-        let (config, record) = run_folder::read_description(&path)
+        let (config, description) = run_folder::read_description(&path)
             .with_context(|| format!("cannot use {}", path.display()))?;
         Ok(Self {
             path,
             config,
-            status: record.status,
-            versions: record.versions,
+            status: description.status,
+            provenance: description.provenance,
         })
     }
 

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use mackrl::config::{Config, ConfigBuilder};
 
 use super::{RecordedRun, setting};
-use crate::{failure::Failure, run_folder::Status};
+use crate::{failure::Failure, provenance::Provenance, run_folder::Status};
 
 /// Settings in which runs may differ and still be compared.
 const FREE: [&str; 5] = [
@@ -69,11 +69,10 @@ impl Grouping {
         names
     }
 
-    /// Versions of this program that the runs come from.
-    pub(crate) fn versions(&self) -> BTreeSet<&str> {
+    /// Where the runs come from: one entry for each experiment.
+    pub(crate) fn provenance(&self) -> Vec<Provenance> {
         let runs = self.series.iter().flat_map(|series| &series.runs);
-        runs.flat_map(|run| run.versions.iter().map(String::as_str))
-            .collect()
+        Provenance::merged(runs.flat_map(|run| &run.provenance))
     }
 }
 
@@ -174,9 +173,20 @@ fn check_alike(runs: &[RecordedRun], selection: &Selection) -> anyhow::Result<()
         if let Some((key, values)) = difference(reference, run, selection) {
             return Err(unlike(reference, run, &key, &values));
         }
-        if runs[0].versions != run.versions {
-            let values = [&runs[0], run].map(|run| run.versions.join(", "));
-            return Err(unlike(&runs[0], run, "the version of the program", &values));
+        for (what, of) in [
+            ("the version of the program", code as fn(&_) -> _),
+            ("map data", map_data),
+        ] {
+            // Maps differ, but one program plays all of them.
+            let reference = if what == "map data" {
+                reference
+            } else {
+                &runs[0]
+            };
+            let values = [reference, run].map(of);
+            if values[0] != values[1] {
+                return Err(unlike(reference, run, what, &values));
+            }
         }
         let identity = (
             &*run.config.env.map,
@@ -196,6 +206,18 @@ fn check_alike(runs: &[RecordedRun], selection: &Selection) -> anyhow::Result<()
         }
     }
     Ok(())
+}
+
+/// The versions of the program that made a run.
+fn code(run: &RecordedRun) -> String {
+    let codes: Vec<&str> = run.provenance.iter().map(|one| &*one.code).collect();
+    codes.join(" then ")
+}
+
+/// Names the data of the map and its units.
+fn map_data(run: &RecordedRun) -> String {
+    let hashes: BTreeSet<&str> = run.provenance.iter().map(|one| &*one.map_sha256).collect();
+    hashes.into_iter().collect::<Vec<_>>().join(" then ")
 }
 
 /// The first setting in which two runs differ that should not, with both values.
@@ -248,11 +270,12 @@ mod tests {
         let builder = (settings.iter()).try_fold(ConfigBuilder::new(), |builder, setting| {
             builder.set(setting)
         });
+        let config = builder.unwrap().build().unwrap();
         RecordedRun {
             path: PathBuf::from(settings.join(" ")),
-            config: builder.unwrap().build().unwrap(),
+            provenance: vec![Provenance::of_run(&config)],
+            config,
             status: Status::Finished,
-            versions: vec!["1".to_owned()],
         }
     }
 
@@ -310,10 +333,10 @@ mod tests {
     #[test]
     fn other_versions_and_repeated_seeds_are_refused() {
         let mut newer = run(&["run.seed=2"]);
-        newer.versions = vec!["2".to_owned()];
+        newer.provenance[0].code = "2".to_owned();
         let refusal = names(vec![run(&[]), newer], &Selection::default()).unwrap_err();
         assert!(
-            refusal.ends_with("differ in the version of the program: 1 and 2"),
+            refusal.contains("differ in the version of the program") && refusal.ends_with("and 2"),
             "{refusal}"
         );
         let refusal =

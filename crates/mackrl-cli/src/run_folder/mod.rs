@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! DIR/config.toml           everything that determines the result; written before the first step
-//! DIR/run.json              command line, version, status
+//! DIR/run.json              command line, provenance, status
 //! DIR/metrics.jsonl         one JSON object a line
 //! DIR/checkpoints/          the latest few, from which the run continues
 //! DIR/weights.safetensors   the policy and the critic; written at the end
@@ -28,7 +28,7 @@ use anyhow::Context;
 use mackrl::{config::Config, training::Checkpoint};
 use serde::{Deserialize, Serialize};
 
-use crate::failure::Failure;
+use crate::{failure::Failure, provenance::Provenance};
 use checkpoints::Surroundings;
 use disk::{Disk, RealDisk, cannot, cannot_write};
 use manifest::{Fingerprint, Growing};
@@ -54,15 +54,15 @@ pub(crate) enum Status {
     Failed,
 }
 
-/// What `run.json` tells: facts that do not determine the result.
+/// What `run.json` tells: where the result comes from, and facts that do not determine it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct RunRecord {
     /// The command line, word by word.
     command: Vec<String>,
-    /// Version of this program.
-    version: String,
-    /// Seed of the run, also in `config.toml`.
-    seed: u64,
+    /// Where the run's results come from: one entry, or one for each version of this program that went on with it, in their
+    /// order.
+    #[serde(default)]
+    provenance: Vec<Provenance>,
     /// Threads in use, which change no result.
     threads: usize,
     status: Status,
@@ -185,12 +185,15 @@ impl RunFolder {
         let (metrics, metrics_so_far) = open_metrics(&path.join(METRICS), metrics_bytes)?;
         let mut record = read_record(path).unwrap_or_else(|| RunRecord {
             command: std::env::args().collect(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            seed: config.run.seed,
+            provenance: Vec::new(),
             threads,
             status: Status::Running,
         });
         record.threads = threads;
+        let provenance = Provenance::of_run(config);
+        if !record.provenance.contains(&provenance) {
+            record.provenance.push(provenance);
+        }
         let mut folder = Self {
             path: path.to_owned(),
             disk: Box::new(RealDisk),
@@ -268,8 +271,8 @@ impl RunFolder {
 pub(crate) struct Description {
     /// How far it has come.
     pub(crate) status: Status,
-    /// Versions of the program that made it, in their order.
-    pub(crate) versions: Vec<String>,
+    /// Where its results come from: one entry for each version of the program that went on with it.
+    pub(crate) provenance: Vec<Provenance>,
 }
 
 /// Whether a run lies in this folder.
@@ -283,14 +286,15 @@ pub(crate) fn is_run(path: &Path) -> bool {
 /// [`Failure::NotARun`] if there is no configuration; otherwise what is wrong with it.
 pub(crate) fn read_description(path: &Path) -> anyhow::Result<(Config, Description)> {
     let config = run::read_config(path)?;
-    let record = read_record(path);
-    let description = Description {
-        status: record
-            .as_ref()
-            .map_or(Status::Running, |record| record.status),
-        versions: record.map_or_else(Vec::new, |record| vec![record.version]),
-    };
-    Ok((config, description))
+    let (status, mut provenance) = read_record(path)
+        .map_or((Status::Running, Vec::new()), |record| {
+            (record.status, record.provenance)
+        });
+    if provenance.is_empty() {
+        // Early versions did not say.
+        provenance.push(Provenance::of_unknown_code(&config));
+    }
+    Ok((config, Description { status, provenance }))
 }
 
 /// Puts `content` at `path`: whoever reads there, and whenever power is lost, finds the old content or the new.

@@ -6,7 +6,7 @@ use mackrl::statistics::{
 use serde::Serialize;
 
 use super::scores::{Cell, Scores};
-use crate::args::ReportArgs;
+use crate::{args::ReportArgs, provenance::Provenance};
 
 /// Levels of a share that curves are asked about.
 const LEVELS: [f64; 3] = [0.5, 0.7, 0.9];
@@ -22,8 +22,8 @@ pub(super) struct Findings {
     pub(super) confidence: f64,
     /// Resamples of each interval.
     pub(super) resamples: usize,
-    /// Versions of the program that the runs come from.
-    pub(super) versions: Vec<String>,
+    /// Where the runs come from: one entry for each experiment.
+    pub(super) provenance: Vec<Provenance>,
     /// Each algorithm on each map.
     pub(super) maps: Vec<MapFindings>,
     /// Each algorithm over all maps; empty if there is only one.
@@ -77,7 +77,7 @@ pub(super) struct Comparison {
 
 impl Findings {
     /// Computes everything.
-    pub(super) fn new(scores: &Scores, args: &ReportArgs, versions: Vec<String>) -> Self {
+    pub(super) fn new(scores: &Scores, args: &ReportArgs, provenance: Vec<Provenance>) -> Self {
         let bootstrap = Bootstrap {
             resamples: usize::try_from(args.resamples).unwrap_or(usize::MAX),
             ..Bootstrap::default()
@@ -92,7 +92,7 @@ impl Findings {
             score,
             confidence: bootstrap.confidence,
             resamples: bootstrap.resamples,
-            versions,
+            provenance,
             maps: (scores.maps.iter())
                 .map(|map| MapFindings::new(scores, map, bootstrap))
                 .collect(),

@@ -5,8 +5,6 @@ mod marl_eval;
 mod scores;
 mod table;
 
-use std::collections::BTreeSet;
-
 use crate::{
     args::ReportArgs,
     output,
@@ -25,12 +23,7 @@ pub(crate) fn run(args: &ReportArgs) -> anyhow::Result<()> {
         let json = serde_json::to_string_pretty(&marl_eval::experiments(&grouping)?)? + "\n";
         run_folder::replace(path, json.as_bytes())?;
     }
-    let versions: BTreeSet<&str> = grouping.versions();
-    let findings = Findings::new(
-        &scores,
-        args,
-        versions.into_iter().map(str::to_owned).collect(),
-    );
+    let findings = Findings::new(&scores, args, grouping.provenance());
     if args.json {
         output::print_json(&findings)
     } else {

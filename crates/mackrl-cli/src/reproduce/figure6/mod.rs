@@ -20,6 +20,7 @@ use super::{
     learning::{Curve, Job, Learner, LearningOptions, TrainingRun, train_all},
     write,
 };
+use crate::provenance::Provenance;
 use published::Published;
 
 /// Maps of the figure.
@@ -47,8 +48,8 @@ pub(crate) struct Figure6Options {
 pub(crate) struct Figure6Report {
     /// Repeats these numbers.
     pub(crate) command: String,
-    /// Version of this program.
-    pub(crate) version: &'static str,
+    /// Where the runs come from: one entry for each experiment.
+    pub(crate) provenance: Vec<Provenance>,
     /// Seeds of each learner on each map.
     pub(crate) seeds: u64,
     /// Environment steps at each test.
@@ -136,7 +137,7 @@ fn report(options: &LearningOptions, runs: &[TrainingRun]) -> Figure6Report {
         .unwrap_or(0);
     Figure6Report {
         command: options.command("figure6"),
-        version: env!("CARGO_PKG_VERSION"),
+        provenance: TrainingRun::provenance_of(runs),
         seeds: options.seeds,
         steps: (0..tests as u64)
             .map(|test| (test * options.interval).min(options.steps))

@@ -19,6 +19,7 @@ use super::{
     learning::{Job, Learner, LearningOptions, TrainingRun, train_all},
     write,
 };
+use crate::provenance::Provenance;
 
 /// Enemies on the map.
 const ENEMIES: usize = 5;
@@ -53,8 +54,8 @@ pub(crate) struct Figure7Options {
 pub(crate) struct Figure7Report {
     /// Repeats these numbers.
     pub(crate) command: String,
-    /// Version of this program.
-    pub(crate) version: &'static str,
+    /// Where the runs come from: one entry for each experiment.
+    pub(crate) provenance: Vec<Provenance>,
     /// Seeds.
     pub(crate) seeds: u64,
     /// Four moments of training.
@@ -127,7 +128,7 @@ fn report(options: &LearningOptions, runs: &[TrainingRun]) -> Figure7Report {
         .collect();
     Figure7Report {
         command: options.command("figure7"),
-        version: env!("CARGO_PKG_VERSION"),
+        provenance: TrainingRun::provenance_of(runs),
         seeds: options.seeds,
         claims: claims::claims(&moments),
         moments,

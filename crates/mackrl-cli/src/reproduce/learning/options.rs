@@ -44,6 +44,10 @@ pub(crate) struct LearningOptions {
     #[arg(long)]
     pub(crate) quick: bool,
 
+    /// Use finished runs of other versions of this program too; the report names them.
+    #[arg(long)]
+    pub(crate) any_code: bool,
+
     /// Runs side by side, each on one thread; changes no result. [default: one for each processor]
     #[arg(long, value_name = "K")]
     pub(crate) jobs: Option<NonZeroUsize>,
@@ -90,6 +94,7 @@ impl Default for LearningOptions {
             steps: 1_000,
             interval: 1_000,
             quick: false,
+            any_code: false,
             jobs: None,
             json: false,
         }
