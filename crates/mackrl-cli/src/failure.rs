@@ -36,6 +36,16 @@ pub(crate) enum Failure {
     CertificateFailed { mismatches: u64 },
     /// Flags that do not go together.
     Usage { message: String },
+    /// A folder that holds another run than the one that should be made there.
+    OtherConfiguration {
+        folder: PathBuf,
+        /// A setting in which they differ.
+        key: String,
+    },
+    /// Many runs that were asked to stop, and can go on.
+    SweepInterrupted { finished: usize, runs: usize },
+    /// A metric that a run does not have.
+    MissingMetric { message: String },
     /// Runs that are not repetitions of one experiment.
     UnlikeRuns {
         message: String,
@@ -79,8 +89,20 @@ impl fmt::Display for Failure {
                 "{} was made by code {code}, expected {CODE}",
                 path.display()
             ),
+            Self::OtherConfiguration { folder, key } => write!(
+                formatter,
+                "{} holds a run with another configuration: `{key}` is different",
+                folder.display()
+            ),
+            Self::SweepInterrupted { finished, runs } => {
+                write!(
+                    formatter,
+                    "interrupted when {finished} of {runs} runs were finished"
+                )
+            }
             Self::BadData { message }
             | Self::Usage { message }
+            | Self::MissingMetric { message }
             | Self::UnlikeRuns { message, .. }
             | Self::ReplayDiffers { message } => formatter.write_str(message),
             Self::CertificateFailed { mismatches } => write!(
@@ -146,9 +168,11 @@ fn exit_of(cause: &(dyn std::error::Error + 'static)) -> Option<Exit> {
             | Failure::FolderLocked { .. }
             | Failure::NotARun { .. }
             | Failure::OtherCode { .. }
+            | Failure::OtherConfiguration { .. }
+            | Failure::MissingMetric { .. }
             | Failure::UnlikeRuns { .. }
             | Failure::Usage { .. } => Exit::Usage,
-            Failure::Interrupted { .. } => Exit::Interrupted,
+            Failure::Interrupted { .. } | Failure::SweepInterrupted { .. } => Exit::Interrupted,
             Failure::BadData { .. } | Failure::ReplayDiffers { .. } => Exit::Data,
             Failure::CertificateFailed { .. } => Exit::CertificateFailed,
         });
@@ -187,6 +211,10 @@ fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
                 "give the folder that `mackrl train` wrote, such as runs/3m-mackrl-seed1"
                     .to_owned(),
             ),
+            Failure::OtherConfiguration { .. } => Some(
+                "choose another folder with --out, or move this run away".to_owned(),
+            ),
+            Failure::SweepInterrupted { .. } => Some("go on with the same command".to_owned()),
             Failure::UnlikeRuns { remedy, .. } => Some(remedy.clone()),
             Failure::OtherCode { .. } => Some(
                 "take such results as they are with --any-code, or choose another folder with --out"

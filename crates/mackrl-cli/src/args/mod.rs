@@ -5,6 +5,7 @@ mod bench;
 mod configuration;
 mod play;
 mod runs;
+mod sweep;
 
 use std::path::PathBuf;
 
@@ -21,6 +22,7 @@ pub(crate) use bench::{
 pub(crate) use configuration::{ConfigurationArgs, read_scenario, with_scenario};
 pub(crate) use play::PlayArgs;
 pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, TrainArgs};
+pub(crate) use sweep::SweepArgs;
 
 /// Teaches teams to coordinate without communicating, by acting jointly on what they commonly know.
 ///
@@ -44,6 +46,7 @@ pub(crate) enum Command {
     Certify(CertifyArgs),
     #[command(hide = true)]
     ExecuteAgent(ExecuteAgentArgs),
+    Sweep(SweepArgs),
     Plot(PlotArgs),
     Report(ReportArgs),
     Reproduce(ReproduceArgs),

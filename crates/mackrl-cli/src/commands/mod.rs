@@ -11,6 +11,7 @@ pub(crate) mod plot;
 pub(crate) mod report;
 pub(crate) mod reproduce;
 pub(crate) mod resume;
+pub(crate) mod sweep;
 pub(crate) mod train;
 
 use std::io::{self, Write};

@@ -35,13 +35,7 @@ pub(crate) fn run(args: &PlotArgs) -> anyhow::Result<()> {
     let grouping = group(find(&args.runs.paths)?, &args.runs.selection())?;
     note_left_out(&grouping);
     let map = only_map(&grouping)?;
-    let series = (grouping.series.iter())
-        .map(|series| {
-            let gridded = Gridded::read(series, &args.metric, args.x)?;
-            let points = points(&gridded, args.statistic);
-            Ok((series.name.clone(), series.runs.len(), points))
-        })
-        .collect::<anyhow::Result<Vec<_>>>()?;
+    let series = curves(&grouping, args)?;
     let chart = chart(args, map, &series);
     let picture = match format {
         Format::Svg => chart.to_svg().into_bytes(),
@@ -56,6 +50,32 @@ pub(crate) fn run(args: &PlotArgs) -> anyhow::Result<()> {
         .map(|drawn| format!("{} ({})", drawn.name, drawn.runs))
         .collect();
     output::print(&format!("{}: {}\n", args.out.display(), curves.join(", ")))
+}
+
+/// The curve of each series: its name, the number of its runs, its points. Learners that do not have the metric, such as the
+/// delegation rate, are left out if another has it.
+fn curves(
+    grouping: &Grouping,
+    args: &PlotArgs,
+) -> anyhow::Result<Vec<(String, usize, Vec<Point>)>> {
+    let mut curves = Vec::new();
+    let mut missing = None;
+    for series in &grouping.series {
+        match Gridded::read(series, &args.metric, args.x) {
+            Ok(gridded) => {
+                let points = points(&gridded, args.statistic);
+                curves.push((series.name.clone(), series.runs.len(), points));
+            }
+            Err(error) if matches!(error.downcast_ref(), Some(Failure::MissingMetric { .. })) => {
+                missing = Some(error);
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    match missing {
+        Some(error) if curves.is_empty() => Err(error),
+        _ => Ok(curves),
+    }
 }
 
 /// How a picture is written.

@@ -43,7 +43,7 @@ impl Measurements {
     /// Reads the `metric` of a run.
     ///
     /// # Errors
-    /// If the metrics cannot be read, or no row has the metric.
+    /// If the metrics cannot be read; [`Failure::MissingMetric`] if no row has the metric.
     pub(crate) fn read(run: &RecordedRun, metric: &str) -> anyhow::Result<Self> {
         let path = run.path.join(run_folder::METRICS);
         let name = path.display();
@@ -72,7 +72,7 @@ impl Measurements {
             let suggestion =
                 suggestion.map_or_else(String::new, |name| format!(", did you mean `{name}`?"));
             let message = format!("{name} has no metric `{metric}`{suggestion}");
-            return Err(Failure::Usage { message }.into());
+            return Err(Failure::MissingMetric { message }.into());
         }
         Ok(found)
     }

@@ -173,17 +173,12 @@ fn check_alike(runs: &[RecordedRun], selection: &Selection) -> anyhow::Result<()
         if let Some((key, values)) = difference(reference, run, selection) {
             return Err(unlike(reference, run, &key, &values));
         }
-        for (what, of) in [
-            ("the version of the program", code as fn(&_) -> _),
-            ("map data", map_data),
+        // Maps differ, but one program plays all of them.
+        let first = &runs[0];
+        for (what, values) in [
+            ("the version of the program", [first, run].map(code)),
+            ("map data", [reference, run].map(map_data)),
         ] {
-            // Maps differ, but one program plays all of them.
-            let reference = if what == "map data" {
-                reference
-            } else {
-                &runs[0]
-            };
-            let values = [reference, run].map(of);
             if values[0] != values[1] {
                 return Err(unlike(reference, run, what, &values));
             }

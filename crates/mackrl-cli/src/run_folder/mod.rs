@@ -15,6 +15,7 @@
 
 mod checkpoints;
 mod disk;
+mod latest;
 mod manifest;
 mod run;
 
@@ -31,6 +32,7 @@ use serde::{Deserialize, Serialize};
 use crate::{failure::Failure, provenance::Provenance};
 use checkpoints::Surroundings;
 use disk::{Disk, RealDisk, cannot, cannot_write};
+pub(crate) use latest::{LatestRow, latest_row};
 use manifest::{Fingerprint, Growing};
 pub(crate) use run::Run;
 
@@ -143,6 +145,20 @@ impl RunFolder {
         Self::check_free(path)?;
         disk::replace(&RealDisk, &path.join(CONFIG), config.to_toml().as_bytes())?;
         Self::open(path, config, threads, lock, 0)
+    }
+
+    /// Creates the folder of a new run for another process to make: with its configuration, and nothing else.
+    ///
+    /// # Errors
+    /// As [`RunFolder::create`].
+    pub(crate) fn prepare(path: &Path, config: &Config, threads: usize) -> anyhow::Result<()> {
+        Self::create(path, config, threads)?.set_status(Status::Interrupted)
+    }
+
+    /// Whether a process writes there now.
+    pub(crate) fn is_in_use(path: &Path) -> bool {
+        let lock = File::open(path.join(LOCK));
+        lock.is_ok_and(|lock| matches!(lock.try_lock(), Err(TryLockError::WouldBlock)))
     }
 
     /// Whether the run there has reached its end.

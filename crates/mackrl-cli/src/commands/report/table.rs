@@ -55,6 +55,12 @@ fn averages_of(map: &MapFindings) -> Vec<Vec<String>> {
     ]);
     let rows = map.algorithms.iter().map(|algorithm| {
         let mut row = vec![algorithm.algorithm.clone(), algorithm.runs.to_string()];
+        if algorithm.runs == 1 {
+            // One run says nothing of the spread of runs.
+            let estimate = algorithm.averages.mean.estimate;
+            row.extend(["", "", &format!("{estimate:.3}"), ""].map(str::to_owned));
+            return row;
+        }
         row.extend(averages(&algorithm.averages));
         row.push(format!("{:.3}", algorithm.standard_error));
         row

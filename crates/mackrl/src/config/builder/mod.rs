@@ -83,10 +83,18 @@ impl ConfigBuilder {
     ///
     /// # Errors
     /// As [`ConfigBuilder::set`]; the error names `typed`.
-    pub fn flag(mut self, typed: &str, assignment: &str) -> Result<Self, ConfigError> {
+    pub fn flag(self, typed: &str, assignment: &str) -> Result<Self, ConfigError> {
         let origin = Origin::CommandLine {
             text: typed.to_owned(),
         };
+        self.assign(origin, assignment)
+    }
+
+    /// As [`ConfigBuilder::set`], for a value that was written at `origin`.
+    ///
+    /// # Errors
+    /// As [`ConfigBuilder::set`]; the error names `origin`.
+    pub fn assign(mut self, origin: Origin, assignment: &str) -> Result<Self, ConfigError> {
         let leaves = parse_assignment(assignment).map_err(|SyntaxError { message, .. }| {
             ConfigError::Syntax {
                 origin: origin.clone(),
