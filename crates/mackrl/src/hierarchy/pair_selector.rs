@@ -65,6 +65,6 @@ impl PairSelector {
         self.encoder
             .write_availability(known, &self.team, available_ga);
         self.encoder.encode(known, &self.team, available_ga, input);
-        mask.fill(true);
+        mask.into_iter().for_each(|mask| mask.fill(true));
     }
 }
