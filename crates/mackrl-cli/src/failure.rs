@@ -116,6 +116,11 @@ impl fmt::Display for Failure {
 impl std::error::Error for Failure {}
 
 impl Failure {
+    /// Whether a run lacks a metric that it was asked for.
+    pub(crate) fn is_missing_metric(error: &anyhow::Error) -> bool {
+        matches!(error.downcast_ref(), Some(Self::MissingMetric { .. }))
+    }
+
     /// Whether a run ended because it was asked to.
     pub(crate) fn is_interruption(error: &anyhow::Error) -> bool {
         matches!(error.downcast_ref(), Some(Self::Interrupted { .. }))

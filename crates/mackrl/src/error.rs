@@ -22,7 +22,7 @@ pub enum Error {
         /// The update in which it was found.
         update: u64,
     },
-    /// An environment refused an action.
+    /// An environment refused an action, or failed for good.
     #[error(transparent)]
-    IllegalAction(#[from] mackrl_env::IllegalAction),
+    Step(#[from] mackrl_env::StepError),
 }

@@ -24,6 +24,7 @@ mod parallel;
 pub mod partition;
 pub mod policy;
 mod real;
+pub mod replay;
 pub mod rollout;
 pub mod statistics;
 mod stopwatch;

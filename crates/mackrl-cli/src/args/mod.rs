@@ -13,7 +13,10 @@ use clap::{Args, Parser, Subcommand};
 
 use crate::{
     provenance::CODE,
-    reproduce::{figure5::Figure5Options, figure6::Figure6Options, figure7::Figure7Options},
+    reproduce::{
+        ablations::AblationOptions, all::AllOptions, figure5::Figure5Options,
+        figure6::Figure6Options, figure7::Figure7Options,
+    },
 };
 pub(crate) use analysis::{CurveStatistic, PlotArgs, ReportArgs};
 pub(crate) use bench::{
@@ -56,7 +59,7 @@ pub(crate) enum Command {
     Bench(BenchArgs),
 }
 
-/// Reproduce a figure of the paper, and judge what the paper says about it
+/// Reproduce the figures of the paper, and judge what the paper says about them
 ///
 /// Example: mackrl reproduce figure5 --out runs/figure5
 #[derive(Debug, Args)]
@@ -70,6 +73,8 @@ pub(crate) enum Figure {
     Figure5(Figure5Options),
     Figure6(Figure6Options),
     Figure7(Figure7Options),
+    Ablations(AblationOptions),
+    All(AllOptions),
 }
 
 /// List the maps that can be played, with the sizes of their arrays, or check a scenario of your own

@@ -66,9 +66,7 @@ fn curves(
                 let points = points(&gridded, args.statistic);
                 curves.push((series.name.clone(), series.runs.len(), points));
             }
-            Err(error) if matches!(error.downcast_ref(), Some(Failure::MissingMetric { .. })) => {
-                missing = Some(error);
-            }
+            Err(error) if Failure::is_missing_metric(&error) => missing = Some(error),
             Err(error) => return Err(error),
         }
     }

@@ -158,7 +158,7 @@ impl Colour {
     pub(crate) const GREY: Self = Self(0x70, 0x70, 0x70);
 
     /// Colours for lines, in the order in which they are best told apart.
-    pub(crate) const LINES: [Self; 7] = [
+    pub(crate) const LINES: [Self; 9] = [
         Self::BLUE,
         Self::VERMILLION,
         Self::GREEN,
@@ -166,6 +166,8 @@ impl Colour {
         Self::PURPLE,
         Self::SKY,
         Self::BLACK,
+        Self::GREY,
+        Self(0x8B, 0x5A, 0x2B),
     ];
 }
 

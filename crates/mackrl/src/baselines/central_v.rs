@@ -12,7 +12,10 @@ use crate::{
         statistics::entropy,
     },
     nn::ParameterLayout,
-    policy::{Actor, ControllerId, ControllerInput, Policy, Recording, Situation, Tally, Weights},
+    policy::{
+        Actor, AgentThought, ControllerId, ControllerInput, Policy, Recording, Situation, Tally,
+        Thought, Weights,
+    },
 };
 
 /// The policy of Central-V.
@@ -200,5 +203,21 @@ impl Actor for CentralVActor {
             .filter(|(_, (row_b, _))| *row_b == b);
         rows.map(|(row, &(_, agent))| self.memory.input(row, ControllerId::AgentController(agent)))
             .collect()
+    }
+
+    fn thought(&mut self, b: usize, _: Situation<'_>, action_n: &[Action]) -> Thought {
+        let rows = self.rows.iter().enumerate();
+        let own = rows.filter(|(_, (row_b, _))| *row_b == b);
+        let mut thought = Thought::default();
+        for (row, &(_, agent)) in own {
+            let (log_p_a, taken) = (self.memory.log_p(row), action_n[agent.index()]);
+            thought.log_p += f64::from(log_p_a[taken.index()]);
+            thought
+                .agents
+                .push(AgentThought::new(agent, log_p_a, taken));
+        }
+        // There is one way only.
+        thought.log_p_path = thought.log_p;
+        thought
     }
 }

@@ -97,7 +97,7 @@ impl CentralCritic {
             outputs: 1,
         };
         let mut layout = ParameterLayout::new();
-        let network = FeedForward::new(&mut layout, "critic", sizes);
+        let network = FeedForward::new(&mut layout, super::CRITIC, sizes);
         let mut parameters = vec![0.0; layout.len()];
         network.initialise(key, &mut parameters);
         Self {

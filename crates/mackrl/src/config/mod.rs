@@ -34,4 +34,7 @@ pub use presets::{Preset, presets};
 pub use sections::{Config, ExplorationConfig, LearnerConfig, PolicyConfig, RunConfig, TestConfig};
 pub use settings::Setting;
 
-pub use crate::{common_knowledge::CommonKnowledgeFeatures, hierarchy::Delegation};
+pub use crate::{
+    common_knowledge::CommonKnowledgeFeatures,
+    hierarchy::{Delegation, Selection},
+};

@@ -15,6 +15,7 @@ use super::{
     controller::ControllerMemory,
     sampling::{Path, Sampler},
     statistics::HierarchyStatistics,
+    thought,
 };
 use crate::{
     Phase, Stopwatch,
@@ -23,7 +24,7 @@ use crate::{
     partition::{Pair, Partition, PartitionBuffer},
     policy::{
         Actor, ControllerId, ControllerInput, DELEGATE, PolicyTable, Recording, Situation, Tally,
-        Weights,
+        Thought, Weights,
     },
 };
 
@@ -47,6 +48,14 @@ pub(super) struct PairwiseActor {
     /// Members' available actions, \[2, A\] and \[N, A\].
     pair_available_ga: Vec<bool>,
     team_available_ga: Vec<bool>,
+}
+
+/// One environment's tables at one step, and what was made of them.
+struct Decision<'a> {
+    table: PolicyTable<'a, f32>,
+    path: &'a mut Path,
+    known_k: &'a [EntitySet],
+    alive_n: &'a [bool],
 }
 
 /// What an actor keeps of one environment.
@@ -206,28 +215,25 @@ impl PairwiseActor {
 
     /// Walks down the hierarchy in environment `b` and, if recording, remembers how log p(u) depends on each choice.
     fn choose(&mut self, b: usize, situation: Situation<'_>, action_n: &mut [Action]) {
-        let hierarchy = &*self.hierarchy;
         let world = &mut self.worlds[b];
-        let key = &situation.keys[b];
-        let table = PolicyTable::new(
-            hierarchy.shape,
-            hierarchy
-                .partitions
-                .in_force(key, situation.step, &mut world.partition_buffer),
-            &world.log_p_selector_p,
-            &world.log_p_pair_kc,
-            &world.log_p_agent_na,
-        )
-        .expect("the buffers have the hierarchy's sizes");
-        let mode = situation.behaviour.mode;
+        let Decision {
+            table,
+            path,
+            known_k,
+            alive_n,
+        } = world.decision(&self.hierarchy, situation, b);
         let sampler = Sampler {
-            key: *key,
+            key: situation.keys[b],
             step: situation.step,
-            mode,
+            mode: situation.behaviour.mode,
         };
-        sampler.sample(&table, action_n, &mut world.path);
-        self.statistics
-            .observe(&table, &world.path, &world.known_k, &world.alive_n);
+        if self.hierarchy.selector.is_some() {
+            sampler.sample(&table, action_n, path);
+        } else {
+            let partition = sampler.draw_partition(table.partitions().len());
+            sampler.sample_within(partition, &table, action_n, path);
+        }
+        self.statistics.observe(&table, path, known_k, alive_n);
         if self.recording == Recording::ForLearning {
             self.stopwatch.lap(Phase::Act);
             let log_p = log_likelihood_with_gradient(&table, action_n, &mut self.gradient);
@@ -373,6 +379,26 @@ impl Actor for PairwiseActor {
         }
         inputs
     }
+
+    fn thought(&mut self, b: usize, situation: Situation<'_>, action_n: &[Action]) -> Thought {
+        let possible = self.hierarchy.active_pairs.iter().copied();
+        let in_force_k = &self.worlds[b].in_force_k;
+        // The others were not asked what they would do.
+        let possible: Vec<Pair> = possible.filter(|pair| in_force_k[pair.index()]).collect();
+        let decision = self.worlds[b].decision(&self.hierarchy, situation, b);
+        let log_p = log_likelihood_with_gradient(&decision.table, action_n, &mut self.gradient);
+        thought::describe(
+            &thought::Subject {
+                table: decision.table,
+                path: decision.path,
+                known_k: decision.known_k,
+                alive_n: decision.alive_n,
+                action_n,
+            },
+            &possible,
+            (log_p, &self.gradient),
+        )
+    }
 }
 
 impl World {
@@ -386,7 +412,8 @@ impl World {
             partition_buffer: PartitionBuffer::default(),
             path: Path::default(),
             log_p_t: Vec::new(),
-            log_p_selector_p: vec![0.0; hierarchy.partitions.count()],
+            // A selector replaces these at every step.
+            log_p_selector_p: uniform(hierarchy.partitions.count()),
             log_p_pair_kc: vec![0.0; shape.pairs() * shape.columns()],
             log_p_agent_na: vec![0.0; shape.agents * shape.actions],
         }
@@ -437,11 +464,44 @@ impl World {
         }
     }
 
+    /// The tables of the latest step.
+    fn decision<'a>(
+        &'a mut self,
+        hierarchy: &'a Hierarchy,
+        situation: Situation<'_>,
+        b: usize,
+    ) -> Decision<'a> {
+        let partitions = hierarchy.partitions.in_force(
+            &situation.keys[b],
+            situation.step,
+            &mut self.partition_buffer,
+        );
+        let table = PolicyTable::new(
+            hierarchy.shape,
+            partitions,
+            &self.log_p_selector_p,
+            &self.log_p_pair_kc,
+            &self.log_p_agent_na,
+        )
+        .expect("the buffers have the hierarchy's sizes");
+        Decision {
+            table,
+            path: &mut self.path,
+            known_k: &self.known_k,
+            alive_n: &self.alive_n,
+        }
+    }
+
     fn lives(&self, pair: Pair) -> bool {
         pair.agents()
             .into_iter()
             .all(|agent| self.alive_n[agent.index()])
     }
+}
+
+/// The log-probabilities of `count` equally likely choices.
+fn uniform(count: usize) -> Vec<f32> {
+    vec![0.0 - (count as f32).ln(); count]
 }
 
 /// The entities of `known` as `member` sees them in environment `b`.

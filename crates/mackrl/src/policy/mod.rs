@@ -8,6 +8,7 @@
 
 mod tables;
 mod tally;
+mod thought;
 
 use std::fmt::Debug;
 
@@ -16,6 +17,10 @@ use serde::{Deserialize, Serialize};
 
 pub use tables::{DELEGATE, PolicyShape, PolicyTable};
 pub use tally::Tally;
+pub(crate) use thought::most_probable;
+pub use thought::{
+    AgentThought, Choice, JointOption, PairThought, PartitionThought, SoloOption, Thought,
+};
 
 use crate::{
     Stopwatch,
@@ -141,6 +146,13 @@ pub trait Actor: Send {
 
     /// What the controllers of environment `b` read at the latest step.
     fn controller_inputs(&self, b: usize) -> Vec<ControllerInput>;
+
+    /// What the controllers of environment `b` computed at the latest step, which was `situation` and led to `action_n` \[N\].
+    /// Nothing, for actors that have no controllers to look into.
+    fn thought(&mut self, b: usize, situation: Situation<'_>, action_n: &[Action]) -> Thought {
+        let _ = (b, situation, action_n);
+        Thought::default()
+    }
 }
 
 /// Names one controller of the hierarchy.

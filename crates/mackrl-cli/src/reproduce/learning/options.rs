@@ -13,6 +13,11 @@ pub(crate) struct LearningOptions {
     #[arg(long, value_name = "DIR", default_value = "runs/learning")]
     pub(crate) out: PathBuf,
 
+    /// Settings of both learners: paper-code, paper or default. The published figures fit the authors' code, not the paper's
+    /// text.
+    #[arg(long, value_name = "NAME", default_value = "paper-code")]
+    pub(crate) preset: String,
+
     /// Seeds of each learner on each map: 1 to N, at least 2.
     #[arg(
         long,
@@ -75,12 +80,19 @@ impl LearningOptions {
         self.jobs.unwrap_or_else(processors)
     }
 
+    /// Environment steps at which `tests` tests are due.
+    #[must_use]
+    pub(crate) fn steps_of(&self, tests: usize) -> Vec<u64> {
+        let due = |test: u64| (test * self.interval).min(self.steps);
+        (0..tests as u64).map(due).collect()
+    }
+
     /// The command that repeats this result, whatever the folder and the number of jobs.
     #[must_use]
     pub(crate) fn command(&self, figure: &str) -> String {
         format!(
-            "mackrl reproduce {figure} --seeds {} --steps {} --interval {}",
-            self.seeds, self.steps, self.interval
+            "mackrl reproduce {figure} --preset {} --seeds {} --steps {} --interval {}",
+            self.preset, self.seeds, self.steps, self.interval
         )
     }
 }
@@ -90,6 +102,7 @@ impl Default for LearningOptions {
     fn default() -> Self {
         Self {
             out: PathBuf::new(),
+            preset: "paper-code".to_owned(),
             seeds: 2,
             steps: 1_000,
             interval: 1_000,
