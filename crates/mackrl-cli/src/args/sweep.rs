@@ -14,18 +14,12 @@ use crate::args::runs::ThreadsArgs;
 ///
 /// --index makes one run in this process, as an array job of a cluster does: it can be given again as often as wanted, goes on
 /// where it was, and ends with exit code 75 if it wants to be started again (after a signal or --time-limit), with 0 once the run is
-/// finished. With SLURM, in a file that `sbatch --array=0-39 --signal=USR1@120 FILE` takes:
-///
-///   #!/bin/sh
-///   #SBATCH --cpus-per-task=1 --time=01:00:00 --requeue
-///   mackrl sweep plan.toml --index "$SLURM_ARRAY_TASK_ID" --time-limit 55m
-///   test $? -ne 75 || scontrol requeue "${SLURM_ARRAY_JOB_ID}_$SLURM_ARRAY_TASK_ID"
+/// finished. examples/sweeps/array-job.sh is such a job for SLURM.
 ///
 /// Exit codes: 0 all is finished, 65 a run failed, 75 interrupted: give the same command again.
 ///
 /// Examples: mackrl sweep examples/sweeps/figure6.toml --jobs 2; mackrl sweep plan.toml --list --json
 #[derive(Debug, Args)]
-#[command(verbatim_doc_comment)]
 pub(crate) struct SweepArgs {
     /// The plan
     #[arg(value_name = "PLAN.toml")]

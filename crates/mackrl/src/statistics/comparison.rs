@@ -6,7 +6,11 @@ use super::mean;
 /// both have a list of runs for each task.
 ///
 /// # Equation
-/// mean over tasks of (1 / (n·m)) Σ_i Σ_j [x_i > y_j] + ½ [x_i = y_j], i in 0..n, j in 0..m: the Mann–Whitney U statistic over n·m.
+/// ```text
+/// mean over tasks of (1 / (n·m)) Σ_i Σ_j [x_i > y_j] + ½ [x_i = y_j],  i in 0..n, j in 0..m
+/// ```
+///
+/// On each task this is the Mann–Whitney U statistic over n·m.
 ///
 /// # Panics
 /// If the two do not have the same number of tasks.

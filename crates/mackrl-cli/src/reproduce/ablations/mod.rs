@@ -190,3 +190,53 @@ impl Versus {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two runs of each variant: MACKRL ends at 0.8, number n at 0.8 − n/10, all ± 0.05.
+    fn example() -> AblationReport {
+        let preset = ConfigBuilder::new().preset("paper").unwrap();
+        let variants = variants(&preset.build().unwrap());
+        let runs: Vec<TrainingRun> = (0..variants.len())
+            .flat_map(|number| {
+                let end = 0.8 - number as f64 / 10.0;
+                [-0.05, 0.05].map(|noise| TrainingRun::of_wins(&[0.0, 0.3, end + noise]))
+            })
+            .collect();
+        report("2s3z", &LearningOptions::default(), &variants, &runs)
+    }
+
+    #[test]
+    fn every_variant_is_compared_with_mackrl() {
+        let report = example();
+        assert_eq!(report.variants.len(), 9);
+        assert_eq!(report.variants[0].versus_mackrl, None);
+        let third = &report.variants[3];
+        assert!((third.final_mean - 0.5).abs() < 1e-12, "{third:?}");
+        let versus = third.versus_mackrl.unwrap();
+        assert!((versus.difference + 0.3).abs() < 1e-12, "{versus:?}");
+        assert_eq!(versus.probability_of_improvement.estimate, 0.0);
+        assert_eq!(report.steps, [0, 1_000, 1_000]);
+    }
+
+    #[test]
+    fn a_team_that_always_delegates_is_held_against_central_v() {
+        let claim = &example().claims[0];
+        // 0.1 is less than two standard errors of 0.071.
+        assert!(claim.holds, "{claim:?}");
+        assert!(claim.evidence.contains("-0.100 ± 0.071"), "{claim:?}");
+    }
+
+    #[test]
+    fn the_plot_has_a_curve_for_each_variant_and_the_table_a_row() {
+        let report = example();
+        let svg = report.chart().to_svg();
+        let text = report.to_string();
+        for variant in &report.variants {
+            let name = format!("{} (2)", variant.label);
+            assert!(svg.contains(&name) && text.contains(&name), "{name}");
+        }
+    }
+}

@@ -117,6 +117,20 @@ impl TrainingRun {
     }
 }
 
+#[cfg(test)]
+impl TrainingRun {
+    /// A run of the built-in configuration that won so often at its tests.
+    pub(crate) fn of_wins(battle_won: &[f64]) -> Self {
+        let config = Config::default();
+        Self {
+            provenance: Some(Provenance::of_run(&config)),
+            config: config.to_toml(),
+            battle_won: battle_won.to_vec(),
+            delegation: Vec::new(),
+        }
+    }
+}
+
 impl Job {
     /// A run with `settings`, `kind` of them in the names of files.
     pub(crate) fn new(map: &str, kind: &str, settings: &[&str], seed: u64) -> Self {
