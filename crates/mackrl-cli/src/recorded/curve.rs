@@ -45,6 +45,12 @@ impl Measurements {
     /// # Errors
     /// If the metrics cannot be read; [`Failure::MissingMetric`] if no row has the metric.
     pub(crate) fn read(run: &RecordedRun, metric: &str) -> anyhow::Result<Self> {
+        if let Some(kept) = &run.kept {
+            return kept.measurements(metric, &run.config).ok_or_else(|| {
+                let message = format!("{} keeps no metric `{metric}`", run.path.display());
+                Failure::MissingMetric { message }.into()
+            });
+        }
         let path = run.path.join(run_folder::METRICS);
         let name = path.display();
         let file = File::open(&path).with_context(|| format!("cannot read {name}"))?;

@@ -8,6 +8,7 @@
 mod curve;
 mod find;
 mod grid;
+mod kept;
 mod series;
 
 use std::path::PathBuf;
@@ -22,7 +23,13 @@ use crate::{
 pub(crate) use curve::{Axis, Measurements, final_mean, share_of};
 pub(crate) use find::find;
 pub(crate) use grid::Gridded;
+pub(crate) use kept::TrainingRun;
 pub(crate) use series::{Grouping, Selection, Series, group};
+
+/// Folder of the files that are kept of the runs of a figure, below the figure's.
+pub(crate) const KEPT: &str = "runs";
+/// Folder of the run folders of a figure, below the figure's.
+pub(crate) const TRAINING: &str = "training";
 
 /// A run that was made earlier, or is being made.
 #[derive(Debug, Clone)]
@@ -31,6 +38,8 @@ pub(crate) struct RecordedRun {
     pub(crate) path: PathBuf,
     /// Everything that determines its result.
     pub(crate) config: Config,
+    /// Its curves, if they are kept in a file and not in a folder.
+    pub(crate) kept: Option<TrainingRun>,
     /// How far it has come.
     pub(crate) status: Status,
     /// Where its results come from: one entry for each version of the program that went on with it.
@@ -48,8 +57,24 @@ impl RecordedRun {
         Ok(Self {
             path,
             config,
+            kept: None,
             status: description.status,
             provenance: description.provenance,
+        })
+    }
+
+    /// Reads the run that is kept in a file.
+    ///
+    /// # Errors
+    /// If the file holds no such run.
+    pub(crate) fn open_kept(path: PathBuf) -> anyhow::Result<Self> {
+        let run = TrainingRun::load(&path)?;
+        Ok(Self {
+            config: run.config()?,
+            status: Status::Finished,
+            provenance: vec![run.provenance().clone()],
+            kept: Some(run),
+            path,
         })
     }
 

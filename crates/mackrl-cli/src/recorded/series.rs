@@ -270,6 +270,7 @@ mod tests {
             path: PathBuf::from(settings.join(" ")),
             provenance: vec![Provenance::of_run(&config)],
             config,
+            kept: None,
             status: Status::Finished,
         }
     }

@@ -22,10 +22,14 @@ use serde::Serialize;
 
 use super::{
     Claim,
-    learning::{Curve, Difference, Job, LearningOptions, TrainingRun, train_all},
+    learning::{Curve, Difference, Job, LearningOptions, train_all},
     write,
 };
-use crate::{plot::LineChart, provenance::Provenance, recorded::final_mean};
+use crate::{
+    plot::LineChart,
+    provenance::Provenance,
+    recorded::{TrainingRun, final_mean},
+};
 use variants::{Variant, variants};
 
 /// Show where MACKRL's gain comes from: one plot of nine learners that differ in one thing each.

@@ -4,11 +4,8 @@ use mackrl::statistics::mean;
 
 use super::MapRuns;
 use crate::{
-    recorded::{final_mean, share_of},
-    reproduce::{
-        Claim, ClaimSource,
-        learning::{Difference, TrainingRun},
-    },
+    recorded::{TrainingRun, final_mean, share_of},
+    reproduce::{Claim, ClaimSource, learning::Difference},
 };
 
 /// Share of the tests at the beginning of training that "initially" means.

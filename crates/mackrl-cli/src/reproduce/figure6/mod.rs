@@ -17,10 +17,10 @@ use serde::Serialize;
 
 use super::{
     Claim,
-    learning::{Curve, Job, Learner, LearningOptions, TrainingRun, train_all},
+    learning::{Curve, Job, Learner, LearningOptions, train_all},
     write,
 };
-use crate::{plot::LineChart, provenance::Provenance};
+use crate::{plot::LineChart, provenance::Provenance, recorded::TrainingRun};
 use published::Published;
 
 /// Maps of the figure.

@@ -16,10 +16,10 @@ use serde::Serialize;
 
 use super::{
     Claim,
-    learning::{Job, Learner, LearningOptions, TrainingRun, train_all},
+    learning::{Job, Learner, LearningOptions, train_all},
     write,
 };
-use crate::{plot::LineChart, provenance::Provenance};
+use crate::{plot::LineChart, provenance::Provenance, recorded::TrainingRun};
 
 /// Enemies on the map.
 const ENEMIES: usize = 5;

@@ -12,12 +12,13 @@ mod run;
 
 use crate::{
     failure::Failure,
+    recorded::TrainingRun,
     signals::StopRequest,
     sweep::{Entry, make_all},
 };
 pub(crate) use curve::{Curve, Difference};
 pub(crate) use options::LearningOptions;
-pub(crate) use run::{Job, Learner, TrainingRun};
+pub(crate) use run::{Job, Learner};
 
 /// Makes all `jobs` that were not made before, as many side by side as `options` says, and gives their runs in the order of
 /// the jobs.
