@@ -32,6 +32,11 @@ pub(crate) enum Failure {
     BadData { message: String },
     /// A result of another version of this program, among which results of this one were to stand.
     OtherCode { path: PathBuf, code: String },
+    /// StarCraft II is not as it has to be.
+    NotReady {
+        /// How much is wrong.
+        problems: usize,
+    },
     /// A team that does not run decentralised.
     CertificateFailed { mismatches: u64 },
     /// Flags that do not go together.
@@ -54,6 +59,12 @@ pub(crate) enum Failure {
     },
     /// A recorded episode that does not play as it did.
     ReplayDiffers { message: String },
+    /// A replay that another version of this program plays.
+    OtherSimulator {
+        message: String,
+        /// Version of the program that plays it.
+        program: String,
+    },
 }
 
 impl fmt::Display for Failure {
@@ -104,7 +115,14 @@ impl fmt::Display for Failure {
             | Self::Usage { message }
             | Self::MissingMetric { message }
             | Self::UnlikeRuns { message, .. }
-            | Self::ReplayDiffers { message } => formatter.write_str(message),
+            | Self::ReplayDiffers { message }
+            | Self::OtherSimulator { message, .. } => formatter.write_str(message),
+            Self::NotReady { problems } => {
+                write!(
+                    formatter,
+                    "StarCraft II cannot be played on here: problems: {problems}"
+                )
+            }
             Self::CertificateFailed { mismatches } => write!(
                 formatter,
                 "not decentralised: {mismatches} actions differ from the central run"
@@ -178,13 +196,17 @@ fn exit_of(cause: &(dyn std::error::Error + 'static)) -> Option<Exit> {
             | Failure::UnlikeRuns { .. }
             | Failure::Usage { .. } => Exit::Usage,
             Failure::Interrupted { .. } | Failure::SweepInterrupted { .. } => Exit::Interrupted,
-            Failure::BadData { .. } | Failure::ReplayDiffers { .. } => Exit::Data,
+            Failure::BadData { .. }
+            | Failure::ReplayDiffers { .. }
+            | Failure::OtherSimulator { .. } => Exit::Data,
             Failure::CertificateFailed { .. } => Exit::CertificateFailed,
+            Failure::NotReady { .. } => Exit::InputOutput,
         });
     }
     if let Some(error) = cause.downcast_ref::<mackrl::Error>() {
         return Some(match error {
             mackrl::Error::Config(_) => Exit::Configuration,
+            mackrl::Error::Step(mackrl_env::StepError::Interrupted(_)) => Exit::InputOutput,
             mackrl::Error::Data(_) | mackrl::Error::NotFinite { .. } => Exit::Data,
             _ => Exit::Defect,
         });
@@ -226,8 +248,12 @@ fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
                     .to_owned(),
             ),
             Failure::ReplayDiffers { .. } => Some(
-                "a replay plays the same only in the version of mackrl that recorded it".to_owned(),
+                "the file was changed, or its program simulated otherwise: record it again"
+                    .to_owned(),
             ),
+            Failure::OtherSimulator { program, .. } => {
+                Some(format!("mackrl {program}, which recorded it, plays it"))
+            }
             _ => None,
         };
     }

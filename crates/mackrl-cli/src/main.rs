@@ -1,8 +1,9 @@
 //! The `mackrl` program: train, evaluate, certify and reproduce.
 //!
 //! This crate holds no algorithm. `args` is what was typed, `commands` what it means, `reproduce` one command for each figure
-//! of the paper, `plot` the drawing of its results, `training_loop` the loop around a trainer, `run_folder` what a run leaves on disk,
-//! `sweep` many runs side by side, `recorded` the runs that were made earlier, `provenance` where a result comes from,
+//! of the paper, `plot` the drawing of its results, `replay` the looking into recorded episodes, `training_loop` the loop around a trainer,
+//! `run_folder` what a run leaves on disk, `sweep` many runs side by side, `recorded` the runs that were made earlier, `provenance` where
+//! a result comes from,
 //! `progress` what a person sees while waiting, `signals` how a person stops waiting, `failure` the one place that turns errors into exit codes. Data go to stdout, everything else to stderr.
 
 mod args;
@@ -14,6 +15,7 @@ mod plot;
 mod progress;
 mod provenance;
 mod recorded;
+mod replay;
 mod reproduce;
 mod run_folder;
 mod signals;
@@ -38,9 +40,12 @@ fn main() -> ExitCode {
         Command::Report(args) => commands::report::run(&args),
         Command::Reproduce(args) => commands::reproduce::run(&args),
         Command::Play(args) => commands::play::run(&args),
+        Command::Replay(args) => commands::replay::run(&args),
+        Command::Explain(args) => commands::explain::run(&args),
         Command::Maps(args) => commands::maps::run(&args),
         Command::Config(args) => commands::config::run(&args),
         Command::Bench(args) => commands::bench::run(&args),
+        Command::Sc2(args) => commands::sc2::run(&args),
     };
     failure::report(outcome)
 }

@@ -31,7 +31,7 @@ mod stopwatch;
 pub mod tabular;
 pub mod training;
 
-pub use error::Error;
+pub use error::{Broken, Error, Moment, NotFinite};
 pub use real::Real;
 pub use stopwatch::{Phase, Stopwatch};
 

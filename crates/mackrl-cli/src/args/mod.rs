@@ -4,7 +4,9 @@ mod analysis;
 mod bench;
 mod configuration;
 mod play;
+mod replay;
 mod runs;
+mod sc2;
 mod sweep;
 
 use std::path::PathBuf;
@@ -23,8 +25,13 @@ pub(crate) use bench::{
     BenchArgs, BenchCommand, BenchEnvironmentArgs, BenchTrainArgs, BenchUpdateArgs,
 };
 pub(crate) use configuration::{ConfigurationArgs, read_scenario, with_scenario};
-pub(crate) use play::PlayArgs;
+pub(crate) use play::{PlayArgs, PolicyChoice};
+pub(crate) use replay::{ExplainArgs, ReplayArgs};
 pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, TrainArgs};
+pub(crate) use sc2::{
+    DoctorArgs, ExecGameArgs, InstallArgs, KillArgs, PsArgs, RecordArgs, Sc2Args, Sc2Command,
+    ServeArgs, UnitsChoice,
+};
 pub(crate) use sweep::SweepArgs;
 
 /// Teaches teams to coordinate without communicating, by acting jointly on what they commonly know.
@@ -54,9 +61,12 @@ pub(crate) enum Command {
     Report(ReportArgs),
     Reproduce(ReproduceArgs),
     Play(PlayArgs),
+    Replay(ReplayArgs),
+    Explain(ExplainArgs),
     Maps(MapsArgs),
     Config(ConfigArgs),
     Bench(BenchArgs),
+    Sc2(Sc2Args),
 }
 
 /// Reproduce the figures of the paper, and judge what the paper says about them

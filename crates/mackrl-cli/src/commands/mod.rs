@@ -5,12 +5,15 @@ pub(crate) mod certify;
 pub(crate) mod config;
 pub(crate) mod evaluate;
 pub(crate) mod execute_agent;
+pub(crate) mod explain;
 pub(crate) mod maps;
 pub(crate) mod play;
 pub(crate) mod plot;
+pub(crate) mod replay;
 pub(crate) mod report;
 pub(crate) mod reproduce;
 pub(crate) mod resume;
+pub(crate) mod sc2;
 pub(crate) mod sweep;
 pub(crate) mod train;
 

@@ -3,7 +3,7 @@
 use mackrl_env::{Action, AgentId, EnvironmentSpec};
 
 use crate::{
-    Phase, Stopwatch,
+    NotFinite, Phase, Stopwatch,
     hierarchy::{
         Sampler,
         agent_controller::{AgentController, forced_action, is_alive},
@@ -11,7 +11,7 @@ use crate::{
         initialisation_key,
         statistics::entropy,
     },
-    nn::ParameterLayout,
+    nn::{Named, ParameterLayout},
     policy::{
         Actor, AgentThought, ControllerId, ControllerInput, Policy, Recording, Situation, Tally,
         Thought, Weights,
@@ -101,7 +101,12 @@ struct CentralVActor {
 
 impl CentralVActor {
     /// Advances the controllers of all living agents; the dead have their one action.
-    fn run(&mut self, weights: &Weights, situation: Situation<'_>, actions_bn: &mut [Action]) {
+    fn run(
+        &mut self,
+        weights: &Weights,
+        situation: Situation<'_>,
+        actions_bn: &mut [Action],
+    ) -> Result<(), NotFinite> {
         let Self {
             controller,
             memory,
@@ -128,6 +133,14 @@ impl CentralVActor {
         }
         let exploration = situation.behaviour.exploration;
         memory.run(controller.controller(), &weights.agents, exploration);
+        memory.check_logits(|row| {
+            let (b, agent) = rows[row];
+            [
+                ("episode", b),
+                ("step", situation.step),
+                ("agent", agent.index()),
+            ]
+        })
     }
 }
 
@@ -140,8 +153,13 @@ impl Actor for CentralVActor {
         self.entropy = (0.0, 0.0);
     }
 
-    fn act(&mut self, weights: &Weights, situation: Situation<'_>, actions_bn: &mut [Action]) {
-        self.run(weights, situation, actions_bn);
+    fn act(
+        &mut self,
+        weights: &Weights,
+        situation: Situation<'_>,
+        actions_bn: &mut [Action],
+    ) -> Result<(), NotFinite> {
+        self.run(weights, situation, actions_bn)?;
         if self.recording == Recording::ForLearning {
             situation
                 .playing
@@ -168,6 +186,7 @@ impl Actor for CentralVActor {
             }
         }
         self.stopwatch.lap(Phase::Act);
+        Ok(())
     }
 
     fn backward(&mut self, weights: &Weights, weight_bt: &[Vec<f32>], gradient: &mut [f32]) -> f64 {
@@ -193,6 +212,14 @@ impl Actor for CentralVActor {
 
     fn stopwatch(&mut self) -> &mut Stopwatch {
         &mut self.stopwatch
+    }
+
+    fn activations(&self) -> Vec<Named<'_, f32>> {
+        self.memory.activations()
+    }
+
+    fn gradients(&self) -> Vec<Named<'_, f32>> {
+        self.memory.gradients()
     }
 
     fn controller_inputs(&self, b: usize) -> Vec<ControllerInput> {

@@ -18,9 +18,10 @@ use super::{
     thought,
 };
 use crate::{
-    Phase, Stopwatch,
+    NotFinite, Phase, Stopwatch,
     common_knowledge::common_knowledge,
     marginalisation::{MarginalGradient, log_likelihood_with_gradient},
+    nn::Named,
     partition::{Pair, Partition, PartitionBuffer},
     policy::{
         Actor, ControllerId, ControllerInput, DELEGATE, PolicyTable, Recording, Situation, Tally,
@@ -102,13 +103,17 @@ impl PairwiseActor {
     }
 
     /// Advances the pair selector in every environment.
-    fn run_selector(&mut self, weights: &Weights, situation: Situation<'_>) {
+    fn run_selector(
+        &mut self,
+        weights: &Weights,
+        situation: Situation<'_>,
+    ) -> Result<(), NotFinite> {
         let (Some(selector), Some(memory), Some(weights)) = (
             &self.hierarchy.selector,
             &mut self.selector,
             &weights.selector,
         ) else {
-            return;
+            return Ok(());
         };
         memory.begin_step(situation.playing.iter().copied());
         for (row, &b) in situation.playing.iter().enumerate() {
@@ -119,18 +124,25 @@ impl PairwiseActor {
         self.stopwatch.lap(Phase::CommonKnowledge);
         // The paper explores at the second and the third level only.
         memory.run(selector.controller(), weights, 0.0);
+        memory.check_logits(|row| {
+            [
+                ("episode", situation.playing[row]),
+                ("step", situation.step),
+            ]
+        })?;
         for (row, &b) in situation.playing.iter().enumerate() {
             self.worlds[b]
                 .log_p_selector_p
                 .copy_from_slice(memory.log_p(row));
         }
         self.stopwatch.lap(Phase::Act);
+        Ok(())
     }
 
     /// Advances the controllers of all pairs of living agents.
-    fn run_pairs(&mut self, weights: &Weights, situation: Situation<'_>) {
+    fn run_pairs(&mut self, weights: &Weights, situation: Situation<'_>) -> Result<(), NotFinite> {
         let Some(weights) = &weights.pairs else {
-            return;
+            return Ok(());
         };
         let controller = &self.hierarchy.pairs;
         let pairs = self.hierarchy.shape.pairs();
@@ -172,16 +184,28 @@ impl PairwiseActor {
             weights,
             situation.behaviour.exploration,
         );
+        memory.check_logits(|asked| {
+            let (b, pair) = self.pair_rows[self.asked_rows[asked]];
+            let [first, second] = pair.agents().map(AgentId::index);
+            let step = situation.step;
+            [
+                ("episode", b),
+                ("step", step),
+                ("agent", first),
+                ("agent", second),
+            ]
+        })?;
         for &row in &self.asked_rows {
             let (b, pair) = self.pair_rows[row];
             let log_p_c = memory.log_p(row);
             let first = pair.index() * log_p_c.len();
             self.worlds[b].log_p_pair_kc[first..first + log_p_c.len()].copy_from_slice(log_p_c);
         }
+        Ok(())
     }
 
     /// Advances the controllers of all living agents.
-    fn run_agents(&mut self, weights: &Weights, situation: Situation<'_>) {
+    fn run_agents(&mut self, weights: &Weights, situation: Situation<'_>) -> Result<(), NotFinite> {
         let controller = &self.hierarchy.agents;
         let agents = self.hierarchy.shape.agents;
         self.agent_rows.clear();
@@ -206,11 +230,20 @@ impl PairwiseActor {
             &weights.agents,
             situation.behaviour.exploration,
         );
+        memory.check_logits(|row| {
+            let (b, agent) = self.agent_rows[row];
+            [
+                ("episode", b),
+                ("step", situation.step),
+                ("agent", agent.index()),
+            ]
+        })?;
         for (row, &(b, agent)) in self.agent_rows.iter().enumerate() {
             let log_p_a = memory.log_p(row);
             let first = agent.index() * log_p_a.len();
             self.worlds[b].log_p_agent_na[first..first + log_p_a.len()].copy_from_slice(log_p_a);
         }
+        Ok(())
     }
 
     /// Walks down the hierarchy in environment `b` and, if recording, remembers how log p(u) depends on each choice.
@@ -295,15 +328,20 @@ impl Actor for PairwiseActor {
         self.worlds.iter_mut().for_each(World::begin);
     }
 
-    fn act(&mut self, weights: &Weights, situation: Situation<'_>, actions_bn: &mut [Action]) {
+    fn act(
+        &mut self,
+        weights: &Weights,
+        situation: Situation<'_>,
+        actions_bn: &mut [Action],
+    ) -> Result<(), NotFinite> {
         for &b in situation.playing {
             self.worlds[b].observe(&self.hierarchy, situation.observations, b);
             self.worlds[b].note_partitions(&self.hierarchy, &situation.keys[b], situation.step);
         }
         self.stopwatch.lap(Phase::CommonKnowledge);
-        self.run_selector(weights, situation);
-        self.run_pairs(weights, situation);
-        self.run_agents(weights, situation);
+        self.run_selector(weights, situation)?;
+        self.run_pairs(weights, situation)?;
+        self.run_agents(weights, situation)?;
         let agents = self.hierarchy.shape.agents;
         for &b in situation.playing {
             let action_n = &mut actions_bn[b * agents..(b + 1) * agents];
@@ -314,6 +352,7 @@ impl Actor for PairwiseActor {
             }
         }
         self.stopwatch.lap(Phase::Act);
+        Ok(())
     }
 
     fn backward(&mut self, weights: &Weights, weight_bt: &[Vec<f32>], gradient: &mut [f32]) -> f64 {
@@ -348,6 +387,18 @@ impl Actor for PairwiseActor {
 
     fn stopwatch(&mut self) -> &mut Stopwatch {
         &mut self.stopwatch
+    }
+
+    fn activations(&self) -> Vec<Named<'_, f32>> {
+        let upper = self.selector.iter();
+        let memories = upper.chain([&self.pairs, &self.agents]);
+        memories.flat_map(ControllerMemory::activations).collect()
+    }
+
+    fn gradients(&self) -> Vec<Named<'_, f32>> {
+        let upper = self.selector.iter();
+        let memories = upper.chain([&self.pairs, &self.agents]);
+        memories.flat_map(ControllerMemory::gradients).collect()
     }
 
     fn controller_inputs(&self, b: usize) -> Vec<ControllerInput> {

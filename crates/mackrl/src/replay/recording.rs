@@ -11,7 +11,7 @@ use mackrl_env::{
 
 use super::{Player, Replay, STEPS_MOST, Step, hexadecimal};
 use crate::{
-    Error,
+    Error, NotFinite,
     central_critic::ValueFunction,
     config::{Config, EnvironmentConfig},
     policy::{Actor, Behaviour, Recording, Situation, Thought, Weights},
@@ -39,7 +39,7 @@ pub fn record_script(
         (player, key),
         |observations, step, actions| {
             team.act(observations, 0, (key, step), actions);
-            (None, None)
+            Ok((None, None))
         },
     )
 }
@@ -73,8 +73,8 @@ pub fn record_policy(
         (player, key),
         |observations, step, actions| {
             let value = watched.critic.value(observations.state(0));
-            let thought = watched.act(observations, step, actions);
-            (Some(value), Some(thought))
+            let thought = watched.act(observations, step, actions)?;
+            Ok((Some(value), Some(thought)))
         },
     )
 }
@@ -110,7 +110,12 @@ impl Watched {
         })
     }
 
-    fn act(&mut self, observations: &Observations, step: usize, actions: &mut [Action]) -> Thought {
+    fn act(
+        &mut self,
+        observations: &Observations,
+        step: usize,
+        actions: &mut [Action],
+    ) -> Result<Thought, NotFinite> {
         let situation = Situation {
             step,
             playing: &[0],
@@ -118,17 +123,20 @@ impl Watched {
             observations,
             behaviour: self.behaviour,
         };
-        self.actor.act(&self.weights, situation, actions);
-        self.actor.thought(0, situation, actions)
+        self.actor.act(&self.weights, situation, actions)?;
+        Ok(self.actor.thought(0, situation, actions))
     }
 }
+
+/// The critic's value, and what the controllers computed, of a team that has them.
+type Chosen = (Option<f32>, Option<Thought>);
 
 /// Plays one episode; `choose` is given observations, step and the actions to write.
 fn record(
     mut skirmish: Skirmish,
     env: &EnvironmentConfig,
     (player, key): (Player, EpisodeKey),
-    mut choose: impl FnMut(&Observations, usize, &mut [Action]) -> (Option<f32>, Option<Thought>),
+    mut choose: impl FnMut(&Observations, usize, &mut [Action]) -> Result<Chosen, NotFinite>,
 ) -> Result<Replay, Error> {
     let mut observations = Observations::new(skirmish.spec(), 1);
     let mut actions = vec![Action::default(); skirmish.spec().agents];
@@ -141,7 +149,7 @@ fn record(
     };
     skirmish.reset(key, &mut observations.row_mut(0));
     loop {
-        let (value, thought) = choose(&observations, replay.steps.len(), &mut actions);
+        let (value, thought) = choose(&observations, replay.steps.len(), &mut actions)?;
         let time_step = skirmish.step(&actions, &mut observations.row_mut(0))?;
         replay.steps.push(Step {
             actions: actions.clone(),

@@ -2,11 +2,12 @@
 
 use std::fmt;
 
-use mackrl_env::{Action, Environment, EpisodeKey, Observations};
+use mackrl_env::{Action, Environment, EpisodeKey, Observations, StepError};
 
 use super::{Episode, RolloutSettings};
 use crate::{
-    Error, Phase,
+    Error, NotFinite, Phase,
+    nn::first_not_finite,
     policy::{Actor, Situation, Weights},
 };
 
@@ -25,6 +26,8 @@ pub struct Shard {
     actions_bn: Vec<Action>,
     agents: usize,
     batch: ShardBatch,
+    /// Episodes that were played in vain.
+    discarded: u64,
 }
 
 impl Shard {
@@ -49,6 +52,7 @@ impl Shard {
                 episodes: Vec::new(),
                 actor,
             },
+            discarded: 0,
         }
     }
 
@@ -63,11 +67,37 @@ impl Shard {
         &mut self.batch
     }
 
+    /// Episodes so far that were played in vain because a world failed.
+    #[must_use]
+    pub const fn discarded(&self) -> u64 {
+        self.discarded
+    }
+
     /// Plays the episodes named `keys`, at most one per environment, to their ends.
     ///
+    /// If a world fails under one of them, all are played again from their beginnings: the actor holds what it computed for
+    /// all rows of a step together, and a failure is rare. Nothing of the failed attempt is kept.
+    ///
     /// # Errors
-    /// If an environment refuses an action, which means that the policy's masks disagree with it.
+    /// If an environment refuses an action, which means that the policy's masks disagree with it, or cannot be played in any
+    /// more, or if something that an environment or a controller gives is not finite.
     pub fn play(
+        &mut self,
+        weights: &Weights,
+        keys: &[EpisodeKey],
+        settings: RolloutSettings,
+    ) -> Result<(), Error> {
+        loop {
+            match self.attempt(weights, keys, settings) {
+                Err(Error::Step(StepError::Interrupted(failure))) if failure.can_be_repeated => {
+                    self.discarded += keys.len() as u64;
+                }
+                outcome => return outcome,
+            }
+        }
+    }
+
+    fn attempt(
         &mut self,
         weights: &Weights,
         keys: &[EpisodeKey],
@@ -80,6 +110,7 @@ impl Shard {
         self.batch.actor.stopwatch().skip();
         for (b, key) in keys.iter().enumerate() {
             self.environments[b].reset(*key, &mut self.observations.row_mut(b));
+            check_finite(&self.observations, b, 0)?;
             self.batch.episodes[b].clear();
             self.batch.episodes[b].remember_state(settings.recording, &self.observations, b);
         }
@@ -98,9 +129,9 @@ impl Shard {
             };
             self.batch
                 .actor
-                .act(weights, situation, &mut self.actions_bn);
+                .act(weights, situation, &mut self.actions_bn)?;
             for &b in &playing {
-                self.step(b, settings)?;
+                self.step(b, step, settings)?;
             }
             self.batch.actor.stopwatch().lap(Phase::Simulate);
             playing.retain(|&b| self.batch.episodes[b].end.is_none());
@@ -108,10 +139,15 @@ impl Shard {
         Ok(())
     }
 
-    /// Plays the chosen actions in environment `b`.
-    fn step(&mut self, b: usize, settings: RolloutSettings) -> Result<(), Error> {
+    /// Plays the chosen actions of a step in environment `b`.
+    fn step(&mut self, b: usize, step: usize, settings: RolloutSettings) -> Result<(), Error> {
         let actions = &self.actions_bn[b * self.agents..(b + 1) * self.agents];
         let time_step = self.environments[b].step(actions, &mut self.observations.row_mut(b))?;
+        if !time_step.reward.is_finite() {
+            let place = [("episode", b), ("step", step)];
+            return Err(NotFinite::new("reward", &place, time_step.reward).into());
+        }
+        check_finite(&self.observations, b, step + 1)?;
         let episode = &mut self.batch.episodes[b];
         episode.reward_t.push(time_step.reward);
         episode.end = time_step.end;
@@ -121,6 +157,25 @@ impl Shard {
         }
         Ok(())
     }
+}
+
+/// Refuses what environment `b` shows before step `step` if a number of it is not finite.
+fn check_finite(observations: &Observations, b: usize, step: usize) -> Result<(), NotFinite> {
+    for (whose, width, numbers) in observations.numbers(b) {
+        if let Some(index) = first_not_finite(numbers) {
+            let mut place = vec![("episode", b), ("step", step)];
+            let tensor = match whose {
+                "state" => whose.to_owned(),
+                row => {
+                    place.push((row, index / width));
+                    format!("observation of an {row}")
+                }
+            };
+            place.push(("feature", index % width));
+            return Err(NotFinite::new(tensor, &place, numbers[index]));
+        }
+    }
+    Ok(())
 }
 
 impl fmt::Debug for ShardBatch {
