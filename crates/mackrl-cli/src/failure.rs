@@ -8,6 +8,7 @@ use std::{
 };
 
 use mackrl::config::{Config, ConfigError};
+use mackrl_env::StepError;
 
 use crate::provenance::CODE;
 
@@ -206,7 +207,7 @@ fn exit_of(cause: &(dyn std::error::Error + 'static)) -> Option<Exit> {
     if let Some(error) = cause.downcast_ref::<mackrl::Error>() {
         return Some(match error {
             mackrl::Error::Config(_) => Exit::Configuration,
-            mackrl::Error::Step(mackrl_env::StepError::Interrupted(_)) => Exit::InputOutput,
+            mackrl::Error::Step(StepError::Interrupted(_)) => Exit::InputOutput,
             mackrl::Error::Data(_) | mackrl::Error::NotFinite { .. } => Exit::Data,
             _ => Exit::Defect,
         });
@@ -256,6 +257,9 @@ fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
             }
             _ => None,
         };
+    }
+    if let Some(mackrl::Error::Step(StepError::Interrupted(_))) = cause.downcast_ref() {
+        return Some("`mackrl sc2 doctor --start` looks for the cause".to_owned());
     }
     match cause.downcast_ref::<ConfigError>()? {
         ConfigError::UnknownMap { .. } => Some("`mackrl maps` lists every map".to_owned()),

@@ -185,8 +185,10 @@ fn from_the_same_messages_we_show_what_the_client_observed() {
         let (head, lines) = read(&file);
         let scenario = skirmish(&head.map).scenario().clone();
         let scenario = Arc::new(scenario);
-        let mut state = Encounter::new(Arc::clone(&scenario), 0.0).muster().clone();
         let settings = SkirmishSettings::default();
+        let mut state = Encounter::new(Arc::clone(&scenario), &settings)
+            .muster()
+            .clone();
         let mut face = Face::new(Arc::clone(&scenario), settings, &state).unwrap();
         let mut comparison = Comparison::new(face.spec());
         let mut roster = None;

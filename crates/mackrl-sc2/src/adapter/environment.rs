@@ -46,7 +46,9 @@ impl StarCraft2 {
         settings: SkirmishSettings,
         pool: Arc<GamePool>,
     ) -> Result<Self, SkirmishError> {
-        let state = Encounter::new(Arc::clone(&scenario), 0.0).muster().clone();
+        let state = Encounter::new(Arc::clone(&scenario), &settings)
+            .muster()
+            .clone();
         Ok(Self {
             face: Face::new(Arc::clone(&scenario), settings, &state)?,
             pool,
@@ -98,7 +100,8 @@ impl StarCraft2 {
             }
             None => {
                 self.pool.count_launch();
-                let seed = (key.bits(0, Draw::Setup(0)) & u64::from(u32::MAX)) as u32;
+                let [a, b, c, d, ..] = key.bits(0, Draw::Setup(0)).to_le_bytes();
+                let seed = u32::from_le_bytes([a, b, c, d]);
                 let mut game = Game::launch(self.pool.settings(), scenario, seed)?;
                 game.begin(&mut muster)?;
                 game

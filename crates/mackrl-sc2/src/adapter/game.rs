@@ -1,33 +1,18 @@
-//! One game in its process: started, joined, stepped, begun anew.
+//! One game in its process: ordered about, stepped, begun anew.
 
-use std::{
-    fs, thread,
-    time::{Duration, Instant},
-};
+use mackrl_env::{EpisodeKey, skirmish::rules::Order};
 
-use mackrl_env::{
-    EpisodeKey,
-    skirmish::{Scenario, rules::Order},
-};
-
-use super::{
-    client::Client, fault::GameFault, pool::GameSettings, process::GameProcess, roster::Roster,
-};
+use super::{client::Client, fault::GameFault, process::GameProcess, roster::Roster};
 use crate::{
     episode_name,
     protocol::{
-        Action, ActionChat, ActionRaw, CreateGame, DIFFICULTY_VERY_HARD, DebugCommand,
-        DebugKillUnit, InterfaceOptions, JoinGame, LocalMap, OWNER_ALLY, OWNER_ENEMY, PlayerSetup,
-        PlayerType, Point2D, RequestAction, RequestDebug, RequestGameInfo, RequestObservation,
-        RequestPing, RequestSaveReplay, RequestStep, ResponseGameInfo, Status, Unit, UnitCommand,
-        ability, debug_command, request, response, unit_command,
+        Action, ActionChat, ActionRaw, DebugCommand, DebugKillUnit, OWNER_ALLY, OWNER_ENEMY,
+        Point2D, RequestAction, RequestDebug, RequestGameInfo, RequestObservation,
+        RequestSaveReplay, RequestStep, ResponseGameInfo, Status, Unit, UnitCommand, ability,
+        debug_command, request, response, unit_command,
     },
-    stand_in::race,
-    units,
 };
 
-/// How often a starting game is asked whether it listens.
-const KNOCK: Duration = Duration::from_millis(10);
 /// Loops that SMAC lets pass after killing everybody.
 const RESTART_LOOPS: u32 = 2;
 /// Loops after which new armies should have appeared.
@@ -37,44 +22,15 @@ const MUSTER_LOOPS_MAX: u32 = 500;
 #[derive(Debug)]
 pub struct Game {
     // The client first: it is dropped, and says goodbye, before the process is killed.
-    client: Client,
-    process: GameProcess,
+    pub(super) client: Client,
+    pub(super) process: GameProcess,
     /// Loops since the game began.
-    game_loop: u32,
+    pub(super) game_loop: u32,
     /// Everybody who was seen last, on either side.
-    living: Vec<u64>,
+    pub(super) living: Vec<u64>,
 }
 
 impl Game {
-    /// Starts a process, makes the game of `scenario` and joins it.
-    ///
-    /// # Errors
-    /// [`GameFault`] tells which part of that failed.
-    pub fn launch(
-        settings: &GameSettings,
-        scenario: &Scenario,
-        seed: u32,
-    ) -> Result<Self, GameFault> {
-        let map = settings.installation.map_file(&scenario.name);
-        let map = map.map_err(|problem| GameFault::Launch(problem.to_string()))?;
-        let map_data = fs::read(map)?;
-        let mut process = GameProcess::start(&settings.installation, &settings.launcher)?;
-        let client = connect(&mut process, settings)?;
-        let mut game = Self {
-            client,
-            process,
-            game_loop: 0,
-            living: Vec::new(),
-        };
-        game.check_version(settings)?;
-        game.create(scenario, seed, map_data)?;
-        if let Some(words) = game.process.last_words() {
-            // Somebody else answers on this port.
-            return Err(GameFault::Launch(words));
-        }
-        Ok(game)
-    }
-
     /// Loops since the game began.
     #[must_use]
     pub const fn game_loop(&self) -> u32 {
@@ -229,65 +185,6 @@ impl Game {
         Err(GameFault::garbage("observation", problem))
     }
 
-    fn check_version(&mut self, settings: &GameSettings) -> Result<(), GameFault> {
-        let (answer, _) = self.client.ask(request::Kind::Ping(RequestPing {}))?;
-        let response::Kind::Ping(ping) = answer else {
-            return Err(unexpected("ping", &answer));
-        };
-        let (found, expected) = (ping.base_build, settings.installation.base_build);
-        match found {
-            Some(found) if found != expected => Err(GameFault::Version(format!(
-                "it says that it is {} ({found}), expected {expected}",
-                ping.game_version.unwrap_or_default()
-            ))),
-            _ => Ok(()),
-        }
-    }
-
-    fn create(
-        &mut self,
-        scenario: &Scenario,
-        seed: u32,
-        map_data: Vec<u8>,
-    ) -> Result<(), GameFault> {
-        let [own, other] = scenario.races.map(race);
-        let participant = PlayerSetup {
-            r#type: Some(PlayerType::Participant.into()),
-            ..PlayerSetup::default()
-        };
-        let computer = PlayerSetup {
-            r#type: Some(PlayerType::Computer.into()),
-            race: Some(other.into()),
-            difficulty: Some(DIFFICULTY_VERY_HARD),
-        };
-        let create = CreateGame {
-            local_map: Some(LocalMap {
-                map_path: Some(units::map_path(&scenario.name)),
-                map_data: Some(map_data),
-            }),
-            player_setup: vec![participant, computer],
-            random_seed: Some(seed),
-            realtime: Some(false),
-        };
-        let (answer, _) = self.client.ask(request::Kind::CreateGame(create))?;
-        let response::Kind::CreateGame(created) = answer else {
-            return Err(unexpected("create_game", &answer));
-        };
-        refused("create_game", created.error, created.error_details)?;
-        let join = JoinGame {
-            race: Some(own.into()),
-            options: Some(InterfaceOptions {
-                raw: Some(true),
-                score: Some(false),
-            }),
-        };
-        let answer = self.ask(request::Kind::JoinGame(join))?;
-        let response::Kind::JoinGame(joined) = answer else {
-            return Err(unexpected("join_game", &answer));
-        };
-        refused("join_game", joined.error, joined.error_details)
-    }
-
     fn act(&mut self, actions: Vec<Action>) -> Result<(), GameFault> {
         // What becomes of single orders is not looked at, nor does SMAC: a unit may refuse one and goes on with the last.
         match self.ask(request::Kind::Action(RequestAction { actions }))? {
@@ -297,7 +194,7 @@ impl Game {
     }
 
     /// Asks something of a game that is played.
-    fn ask(&mut self, kind: request::Kind) -> Result<response::Kind, GameFault> {
+    pub(super) fn ask(&mut self, kind: request::Kind) -> Result<response::Kind, GameFault> {
         let (answer, status) = self.client.ask(kind)?;
         if status == Status::InGame {
             return Ok(answer);
@@ -313,27 +210,6 @@ impl Game {
 impl Drop for Game {
     fn drop(&mut self) {
         self.client.quit();
-    }
-}
-
-/// Knocks until the game listens.
-fn connect(process: &mut GameProcess, settings: &GameSettings) -> Result<Client, GameFault> {
-    let began = Instant::now();
-    loop {
-        let failure = match Client::connect(process.address(), settings.patience) {
-            Ok(client) => return Ok(client),
-            Err(failure) => failure,
-        };
-        if let Some(words) = process.last_words() {
-            return Err(GameFault::Launch(words));
-        }
-        if began.elapsed() > settings.launch_patience {
-            let waited = settings.launch_patience.as_secs_f64();
-            return Err(GameFault::Launch(format!(
-                "nobody listened within {waited:.1} s: {failure}"
-            )));
-        }
-        thread::sleep(KNOCK);
     }
 }
 
@@ -364,23 +240,7 @@ fn command(roster: &Roster, unit: usize, order: Order) -> UnitCommand {
     }
 }
 
-fn refused(
-    request: &'static str,
-    error: Option<i32>,
-    details: Option<String>,
-) -> Result<(), GameFault> {
-    match error {
-        None => Ok(()),
-        Some(number) => Err(GameFault::Refused {
-            request,
-            reason: format!("error {number} {}", details.unwrap_or_default())
-                .trim_end()
-                .to_owned(),
-        }),
-    }
-}
-
-fn unexpected(request: &'static str, answer: &response::Kind) -> GameFault {
+pub(super) fn unexpected(request: &'static str, answer: &response::Kind) -> GameFault {
     let text: String = format!("{answer:?}").chars().take(60).collect();
     GameFault::garbage(request, format!("the answer to something else: {text}"))
 }

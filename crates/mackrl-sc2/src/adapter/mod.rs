@@ -17,6 +17,7 @@ mod environment;
 mod fault;
 mod game;
 mod installation;
+mod launch;
 mod pool;
 pub mod process;
 pub(crate) mod roster;

@@ -59,7 +59,7 @@ impl Arena {
     #[must_use]
     pub fn new(scenario: Arc<Scenario>, seed: u64) -> Self {
         let settings = SkirmishSettings::default();
-        let encounter = Encounter::new(Arc::clone(&scenario), settings.spawn_scatter);
+        let encounter = Encounter::new(Arc::clone(&scenario), &settings);
         let face = Face::new(Arc::clone(&scenario), settings, encounter.muster())
             .expect("built-in settings are valid");
         let key = EpisodeKey::new(seed, Stream::Other, 0);
@@ -225,7 +225,7 @@ impl EpisodeRecord {
         }
         match actions {
             Ok(actions) if self.steps.len() < RECORDED_STEPS_MAX => {
-                self.steps.push((actions, hash))
+                self.steps.push((actions, hash));
             }
             Ok(_) => self.problem = Some(format!("more than {RECORDED_STEPS_MAX} steps")),
             Err(problem) => self.problem = Some(problem),

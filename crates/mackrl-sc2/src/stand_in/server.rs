@@ -117,7 +117,7 @@ impl StandIn {
                 Ok(request) => self.game.answer(&request),
                 Err(_) => self.game.answer_garbage(),
             };
-            let fault = self.faults.as_mut().and_then(FaultPlan::next);
+            let fault = self.faults.as_mut().and_then(FaultPlan::draw_fault);
             if fault == Some(Fault::Refuse) {
                 response = Response {
                     kind: None,

@@ -367,7 +367,7 @@ fn no_mutation_of_real_traffic_makes_the_server_panic() {
             let mut bytes = message.clone();
             for mutation in 0..(draw(0) % 8).saturating_sub(4) as usize {
                 let (at, what) = (draw(1 + mutation), draw(4 + mutation));
-                let at = (at % bytes.len().max(1) as u64) as usize;
+                let at = usize::try_from(at % bytes.len().max(1) as u64).unwrap();
                 match what % 3 {
                     0 if !bytes.is_empty() => bytes[at] = what.to_le_bytes()[7],
                     1 if !bytes.is_empty() => drop(bytes.remove(at)),

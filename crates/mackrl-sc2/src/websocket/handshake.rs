@@ -1,6 +1,6 @@
 //! The exchange of HTTP heads by which a connection becomes a websocket.
 
-use std::io::Read;
+use std::io::{BufRead, Read};
 
 use base64::{Engine, engine::general_purpose::STANDARD};
 use sha1::{Digest, Sha1};
@@ -71,7 +71,7 @@ pub(super) fn key(bytes: [u8; 16]) -> String {
 }
 
 /// Reads up to the empty line that ends a head.
-pub(super) fn read_head(input: &mut impl Read) -> Result<String, WebsocketError> {
+pub(super) fn read_head(input: &mut impl BufRead) -> Result<String, WebsocketError> {
     let mut head = Vec::new();
     for byte in input.take(HEAD_LENGTH_MAX as u64).bytes() {
         head.push(byte?);

@@ -115,7 +115,7 @@ impl Player {
         loop {
             match self.attempt(key) {
                 Err(StepError::Interrupted(failure)) if failure.can_be_repeated => {}
-                outcome => return Ok(outcome?),
+                outcome => return Ok(outcome.map_err(mackrl::Error::from)?),
             }
         }
     }
