@@ -42,6 +42,22 @@ pub(crate) enum Failure {
     CertificateFailed { mismatches: u64 },
     /// Flags that do not go together.
     Usage { message: String },
+    /// A folder that holds another run than the one that should be made there.
+    OtherConfiguration {
+        folder: PathBuf,
+        /// A setting in which they differ.
+        key: String,
+    },
+    /// Many runs that were asked to stop, and can go on.
+    SweepInterrupted { finished: usize, runs: usize },
+    /// A metric that a run does not have.
+    MissingMetric { message: String },
+    /// Runs that are not repetitions of one experiment.
+    UnlikeRuns {
+        message: String,
+        /// What can be done.
+        remedy: String,
+    },
     /// A recorded episode that does not play as it did.
     ReplayDiffers { message: String },
     /// A replay that another version of this program plays.
@@ -85,8 +101,21 @@ impl fmt::Display for Failure {
                 "{} was made by code {code}, expected {CODE}",
                 path.display()
             ),
+            Self::OtherConfiguration { folder, key } => write!(
+                formatter,
+                "{} holds a run with another configuration: `{key}` is different",
+                folder.display()
+            ),
+            Self::SweepInterrupted { finished, runs } => {
+                write!(
+                    formatter,
+                    "interrupted when {finished} of {runs} runs were finished"
+                )
+            }
             Self::BadData { message }
             | Self::Usage { message }
+            | Self::MissingMetric { message }
+            | Self::UnlikeRuns { message, .. }
             | Self::ReplayDiffers { message }
             | Self::OtherSimulator { message, .. } => formatter.write_str(message),
             Self::NotReady { problems } => {
@@ -106,6 +135,11 @@ impl fmt::Display for Failure {
 impl std::error::Error for Failure {}
 
 impl Failure {
+    /// Whether a run lacks a metric that it was asked for.
+    pub(crate) fn is_missing_metric(error: &anyhow::Error) -> bool {
+        matches!(error.downcast_ref(), Some(Self::MissingMetric { .. }))
+    }
+
     /// Whether a run ended because it was asked to.
     pub(crate) fn is_interruption(error: &anyhow::Error) -> bool {
         matches!(error.downcast_ref(), Some(Self::Interrupted { .. }))
@@ -158,8 +192,11 @@ fn exit_of(cause: &(dyn std::error::Error + 'static)) -> Option<Exit> {
             | Failure::FolderLocked { .. }
             | Failure::NotARun { .. }
             | Failure::OtherCode { .. }
+            | Failure::OtherConfiguration { .. }
+            | Failure::MissingMetric { .. }
+            | Failure::UnlikeRuns { .. }
             | Failure::Usage { .. } => Exit::Usage,
-            Failure::Interrupted { .. } => Exit::Interrupted,
+            Failure::Interrupted { .. } | Failure::SweepInterrupted { .. } => Exit::Interrupted,
             Failure::BadData { .. }
             | Failure::ReplayDiffers { .. }
             | Failure::OtherSimulator { .. } => Exit::Data,
@@ -202,6 +239,11 @@ fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
                 "give the folder that `mackrl train` wrote, such as runs/3m-mackrl-seed1"
                     .to_owned(),
             ),
+            Failure::OtherConfiguration { .. } => Some(
+                "choose another folder with --out, or move this run away".to_owned(),
+            ),
+            Failure::SweepInterrupted { .. } => Some("go on with the same command".to_owned()),
+            Failure::UnlikeRuns { remedy, .. } => Some(remedy.clone()),
             Failure::OtherCode { .. } => Some(
                 "take such results as they are with --any-code, or choose another folder with --out"
                     .to_owned(),

@@ -1,8 +1,9 @@
 //! The `mackrl` program: train, evaluate, certify and reproduce.
 //!
 //! This crate holds no algorithm. `args` is what was typed, `commands` what it means, `reproduce` one command for each figure
-//! of the paper, `plot` the drawing of its results, `replay` the looking into recorded episodes, `serve` runs in the browser, `training_loop` the loop around a trainer,
-//! `run_folder` what a run leaves on disk, `provenance` where a result comes from,
+//! of the paper, `plot` the drawing of its results, `replay` the looking into recorded episodes, `serve` runs in the browser,
+//! `training_loop` the loop around a trainer, `run_folder` what a run leaves on disk, `sweep` many runs side by side, `recorded` the
+//! runs that were made earlier, `provenance` where a result comes from,
 //! `progress` what a person sees while waiting, `signals` how a person stops waiting, `failure` the one place that turns errors into exit codes. Data go to stdout, everything else to stderr.
 
 mod args;
@@ -13,11 +14,13 @@ mod output;
 mod plot;
 mod progress;
 mod provenance;
+mod recorded;
 mod replay;
 mod reproduce;
 mod run_folder;
 mod serve;
 mod signals;
+mod sweep;
 mod training_loop;
 
 use std::process::ExitCode;
@@ -33,6 +36,9 @@ fn main() -> ExitCode {
         Command::Evaluate(args) => commands::evaluate::run(&args),
         Command::Certify(args) => commands::certify::run(&args),
         Command::ExecuteAgent(args) => commands::execute_agent::run(&args),
+        Command::Sweep(args) => commands::sweep::run(&args),
+        Command::Plot(args) => commands::plot::run(&args),
+        Command::Report(args) => commands::report::run(&args),
         Command::Reproduce(args) => commands::reproduce::run(&args),
         Command::Play(args) => commands::play::run(&args),
         Command::Replay(args) => commands::replay::run(&args),

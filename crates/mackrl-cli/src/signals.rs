@@ -6,6 +6,8 @@ use std::{
         Arc,
         atomic::{AtomicBool, Ordering},
     },
+    thread,
+    time::Duration,
 };
 
 use anyhow::Context;
@@ -48,8 +50,26 @@ impl StopRequest {
         self.0.load(Ordering::Relaxed)
     }
 
+    /// Asks to stop, as a signal would, when nobody holds the other end of stdin any more.
+    pub(crate) fn make_when_stdin_ends(&self) {
+        let request = self.clone();
+        thread::spawn(move || {
+            // Whatever comes is ignored; an error is an end as well.
+            let _ = io::copy(&mut io::stdin(), &mut io::sink());
+            request.make();
+        });
+    }
+
+    /// Asks to stop, as a signal would, after some time.
+    pub(crate) fn make_after(&self, limit: Duration) {
+        let request = self.clone();
+        thread::spawn(move || {
+            thread::sleep(limit);
+            request.make();
+        });
+    }
+
     /// Asks to stop, as a signal would.
-    #[cfg(test)]
     pub(crate) fn make(&self) {
         self.0.store(true, Ordering::Relaxed);
     }

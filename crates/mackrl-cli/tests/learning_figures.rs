@@ -76,6 +76,29 @@ fn finished_runs_are_used_again_and_jobs_change_nothing() {
 }
 
 #[test]
+fn everything_together_is_one_page() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = Command::cargo_bin("mackrl")
+        .expect("the program is built")
+        .args(["reproduce", "all", "--without-ablations", "--seeds", "2"])
+        .args(["--steps", "1000", "--interval", "1000", "--out"])
+        .arg(folder.path())
+        .output()
+        .expect("the program starts");
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{error}");
+    let page = fs::read_to_string(folder.path().join("report.html")).expect("a page");
+    assert_eq!(
+        page.matches("<svg ").count(),
+        4,
+        "figures 5, 6 (two maps) and 7"
+    );
+    assert!(page.contains("does not hold") && page.contains("config_sha256"));
+    let told = String::from_utf8_lossy(&output.stdout);
+    assert!(told.trim_end().ends_with("report.html"), "{told}");
+}
+
+#[test]
 fn a_single_seed_has_no_standard_error() {
     let output = Command::cargo_bin("mackrl")
         .expect("the program is built")

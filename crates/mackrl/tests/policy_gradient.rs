@@ -115,6 +115,14 @@ fn the_gradient_of_whole_episodes_is_that_of_their_log_probability() {
 }
 
 #[test]
+fn the_gradient_is_right_where_few_pairs_are_asked_and_where_nobody_selects() {
+    for setting in ["policy.partitions=round-robin", "policy.selector=uniform"] {
+        let subject = check(&["env.map=3m", setting], 3, 1e-3);
+        assert!(subject.team.places("pair_selector").is_empty(), "{setting}");
+    }
+}
+
+#[test]
 fn the_gradient_of_many_short_episodes_is_that_of_their_log_probability() {
     check(&["env.map=matrix-game"], 61, 1e-2);
 }

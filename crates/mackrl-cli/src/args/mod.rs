@@ -1,5 +1,6 @@
 //! What can be typed: the commands and their flags, as text for `--help` and as values for `commands`.
 
+mod analysis;
 mod bench;
 mod configuration;
 mod play;
@@ -7,6 +8,7 @@ mod replay;
 mod runs;
 mod sc2;
 mod serve;
+mod sweep;
 
 use std::path::PathBuf;
 
@@ -14,8 +16,12 @@ use clap::{Args, Parser, Subcommand};
 
 use crate::{
     provenance::CODE,
-    reproduce::{figure5::Figure5Options, figure6::Figure6Options, figure7::Figure7Options},
+    reproduce::{
+        ablations::AblationOptions, all::AllOptions, figure5::Figure5Options,
+        figure6::Figure6Options, figure7::Figure7Options,
+    },
 };
+pub(crate) use analysis::{CurveStatistic, PlotArgs, ReportArgs};
 pub(crate) use bench::{
     BenchArgs, BenchCommand, BenchEnvironmentArgs, BenchTrainArgs, BenchUpdateArgs,
 };
@@ -28,6 +34,7 @@ pub(crate) use sc2::{
     ServeArgs, UnitsChoice,
 };
 pub(crate) use serve::ServeRunsArgs;
+pub(crate) use sweep::SweepArgs;
 
 /// Teaches teams to coordinate without communicating, by acting jointly on what they commonly know.
 ///
@@ -51,6 +58,9 @@ pub(crate) enum Command {
     Certify(CertifyArgs),
     #[command(hide = true)]
     ExecuteAgent(ExecuteAgentArgs),
+    Sweep(SweepArgs),
+    Plot(PlotArgs),
+    Report(ReportArgs),
     Reproduce(ReproduceArgs),
     Play(PlayArgs),
     Replay(ReplayArgs),
@@ -62,7 +72,7 @@ pub(crate) enum Command {
     Sc2(Sc2Args),
 }
 
-/// Reproduce a figure of the paper, and judge what the paper says about it
+/// Reproduce the figures of the paper, and judge what the paper says about them
 ///
 /// Example: mackrl reproduce figure5 --out runs/figure5
 #[derive(Debug, Args)]
@@ -76,6 +86,8 @@ pub(crate) enum Figure {
     Figure5(Figure5Options),
     Figure6(Figure6Options),
     Figure7(Figure7Options),
+    Ablations(AblationOptions),
+    All(AllOptions),
 }
 
 /// List the maps that can be played, with the sizes of their arrays, or check a scenario of your own

@@ -56,6 +56,10 @@ pub(crate) struct ResumeArgs {
     /// Print a JSON summary at the end instead of a sentence
     #[arg(long)]
     pub(crate) json: bool,
+
+    /// Stop as after a signal when stdin ends: whoever holds its other end has ended, however that came
+    #[arg(long, hide = true)]
+    pub(crate) leashed: bool,
 }
 
 /// Play greedy episodes with a trained team and report how it does

@@ -8,9 +8,28 @@ pub(crate) mod execute_agent;
 pub(crate) mod explain;
 pub(crate) mod maps;
 pub(crate) mod play;
+pub(crate) mod plot;
 pub(crate) mod replay;
+pub(crate) mod report;
 pub(crate) mod reproduce;
 pub(crate) mod resume;
 pub(crate) mod sc2;
 pub(crate) mod serve;
+pub(crate) mod sweep;
 pub(crate) mod train;
+
+use std::io::{self, Write};
+
+use crate::recorded::Grouping;
+
+/// Says that runs were left out, if some were.
+fn note_left_out(grouping: &Grouping) {
+    if grouping.left_out > 0 {
+        // The result is the same whether anybody reads this or not.
+        let _ = writeln!(
+            io::stderr(),
+            "note: {} runs are not finished and left out; --unfinished uses them as far as they have come",
+            grouping.left_out
+        );
+    }
+}

@@ -1,33 +1,60 @@
 //! `mackrl resume`: an interrupted run goes on.
 
-use std::io::{self, Write};
+use std::{
+    io::{self, Write},
+    path::Path,
+};
 
 use mackrl::training::Trainer;
 
 use crate::{
     args::ResumeArgs,
     commands::sc2,
+    progress::Detail,
     run_folder::{Resumption, RunFolder},
     signals::StopRequest,
-    training_loop::{self, Reporting},
+    training_loop::{self, Reporting, Summary},
 };
 
 /// Continues a run at its latest checkpoint; from then on it is as if it had never stopped.
 pub(crate) fn run(args: &ResumeArgs) -> anyhow::Result<()> {
-    if RunFolder::is_finished(&args.run) {
-        // Nothing is wrong: whoever starts runs again until they are finished gets what they want.
-        let folder = args.run.display();
-        let _ = writeln!(io::stderr(), "{folder} is finished: nothing is left to do");
-        return Ok(());
-    }
     let stop = StopRequest::listen()?;
-    let threads = args.threads.count();
+    if args.leashed {
+        stop.make_when_stdin_ends();
+    }
+    match go_on(
+        &args.run,
+        args.threads.count(),
+        &stop,
+        args.dashboard.detail(),
+    )? {
+        Some(summary) => training_loop::print(&summary, args.json),
+        None => Ok(()),
+    }
+}
+
+/// Continues the run at `path` to its end; gives nothing if it is there already.
+///
+/// # Errors
+/// [`crate::failure::Failure::Interrupted`] when asked to stop; otherwise what went wrong.
+pub(crate) fn go_on(
+    path: &Path,
+    threads: usize,
+    stop: &StopRequest,
+    detail: Detail,
+) -> anyhow::Result<Option<Summary>> {
+    if RunFolder::is_finished(path) {
+        // Nothing is wrong: whoever starts runs again until they are finished gets what they want.
+        let folder = path.display();
+        let _ = writeln!(io::stderr(), "{folder} is finished: nothing is left to do");
+        return Ok(None);
+    }
     let Resumption {
         mut folder,
         config,
         checkpoint,
         damaged,
-    } = RunFolder::resume(&args.run, threads)?;
+    } = RunFolder::resume(path, threads)?;
     for damage in damaged {
         // The run continues from an earlier checkpoint, whether anybody reads this or not.
         let _ = writeln!(io::stderr(), "warning: {damage}; an earlier one is used");
@@ -37,7 +64,5 @@ pub(crate) fn run(args: &ResumeArgs) -> anyhow::Result<()> {
         trainer.restore(&checkpoint)?;
     }
     let mut training = Reporting::new(trainer, &config);
-    let detail = args.dashboard.detail();
-    let summary = training_loop::train_into(&mut folder, &mut training, &config, &stop, detail)?;
-    training_loop::print(&summary, args.json)
+    training_loop::train_into(&mut folder, &mut training, &config, stop, detail).map(Some)
 }

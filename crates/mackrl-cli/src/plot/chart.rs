@@ -30,7 +30,6 @@ pub(crate) struct Axis {
 
 /// A corner of the plotting area.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[expect(dead_code, reason = "every figure has its own emptiest corner")]
 pub(crate) enum Corner {
     /// Top left.
     UpperLeft,
@@ -40,6 +39,45 @@ pub(crate) enum Corner {
     LowerLeft,
     /// Bottom right.
     LowerRight,
+}
+
+impl Corner {
+    /// The corner of the plot in which the fewest points lie, bands included: axes that fit the data are assumed where
+    /// `y_range` is `None`.
+    #[must_use]
+    pub(crate) fn emptiest(series: &[Series], y_range: Option<[f64; 2]>) -> Self {
+        let points = || series.iter().flat_map(|series| &series.points);
+        let xs = extent(points().map(|point| point.x));
+        let ys = y_range.unwrap_or_else(|| extent(points().flat_map(|point| point.band)));
+        let [middle_x, middle_y] = [xs, ys].map(|[low, high]| f64::midpoint(low, high));
+        let crowd = |corner: &Self| {
+            let inside = |point: &&Point| {
+                let [low, high] = point.band;
+                match corner {
+                    Self::LowerRight => point.x >= middle_x && low < middle_y,
+                    Self::UpperLeft => point.x <= middle_x && high > middle_y,
+                    Self::UpperRight => point.x >= middle_x && high > middle_y,
+                    Self::LowerLeft => point.x <= middle_x && low < middle_y,
+                }
+            };
+            points().filter(inside).count()
+        };
+        let corners = [
+            Self::LowerRight,
+            Self::UpperLeft,
+            Self::UpperRight,
+            Self::LowerLeft,
+        ];
+        let emptiest = corners.into_iter().min_by_key(crowd);
+        emptiest.unwrap_or(Self::LowerRight)
+    }
+}
+
+/// Lowest and highest of some numbers.
+fn extent(numbers: impl Iterator<Item = f64>) -> [f64; 2] {
+    numbers.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], number| {
+        [low.min(number), high.max(number)]
+    })
 }
 
 /// Points that belong together.
@@ -62,8 +100,28 @@ pub(crate) struct Point {
     pub(crate) x: f64,
     /// Place on the vertical axis.
     pub(crate) y: f64,
-    /// The band reaches from `y - half_width` to `y + half_width`; 0 for none.
-    pub(crate) half_width: f64,
+    /// Lower and upper edge of the band; both are y where there is none.
+    pub(crate) band: [f64; 2],
+}
+
+impl Point {
+    /// A point without a band.
+    #[must_use]
+    pub(crate) const fn exact(x: f64, y: f64) -> Self {
+        Self { x, y, band: [y; 2] }
+    }
+
+    /// A point with a band of `half_width` on both sides.
+    #[must_use]
+    pub(crate) const fn with_error(x: f64, y: f64, half_width: f64) -> Self {
+        let band = [y - half_width, y + half_width];
+        Self { x, y, band }
+    }
+
+    /// Whether there is a band.
+    pub(super) const fn has_band(&self) -> bool {
+        self.band[0] < self.band[1]
+    }
 }
 
 /// How the points of a series are drawn.
@@ -98,6 +156,19 @@ impl Colour {
     pub(crate) const VERMILLION: Self = Self(0xD5, 0x5E, 0x00);
     /// For references that belong to no series.
     pub(crate) const GREY: Self = Self(0x70, 0x70, 0x70);
+
+    /// Colours for lines, in the order in which they are best told apart.
+    pub(crate) const LINES: [Self; 9] = [
+        Self::BLUE,
+        Self::VERMILLION,
+        Self::GREEN,
+        Self::ORANGE,
+        Self::PURPLE,
+        Self::SKY,
+        Self::BLACK,
+        Self::GREY,
+        Self(0x8B, 0x5A, 0x2B),
+    ];
 }
 
 impl LineChart {

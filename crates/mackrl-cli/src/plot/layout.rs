@@ -37,9 +37,7 @@ struct Axes {
 /// Lays `chart` out.
 pub(super) fn lay_out(chart: &LineChart) -> Scene {
     let x = scale(chart.x_axis.range, chart, 6.0, |point| [point.x; 2]);
-    let y = scale(chart.y_axis.range, chart, 7.0, |point| {
-        [point.y - point.half_width, point.y + point.half_width]
-    });
+    let y = scale(chart.y_axis.range, chart, 7.0, |point| point.band);
     let plot_area = plot_area(chart, &y);
     let axes = Axes {
         x: x.onto(plot_area.left, plot_area.right),
@@ -164,15 +162,13 @@ fn data(chart: &LineChart, axes: &Axes) -> Vec<Shape> {
 }
 
 fn band(series: &Series, axes: &Axes) -> Option<Shape> {
-    let edge = |sign: f64| {
-        (series.points.iter()).map(move |point| {
-            let y = point.y + sign * point.half_width;
-            [axes.x.place(point.x), axes.y.place(y)]
-        })
+    let edge = |side: usize| {
+        let place = move |point: &Point| [axes.x.place(point.x), axes.y.place(point.band[side])];
+        series.points.iter().map(place)
     };
-    let wide = series.points.iter().any(|point| point.half_width > 0.0);
+    let wide = series.points.iter().any(Point::has_band);
     wide.then(|| Shape::Polygon {
-        points: edge(1.0).chain(edge(-1.0).rev()).collect(),
+        points: edge(1).chain(edge(0).rev()).collect(),
         colour: series.colour,
         opacity: BAND_OPACITY,
     })
@@ -252,7 +248,7 @@ fn sample(series: &Series, start: f64, middle: f64) -> Vec<Shape> {
         Mark::Rings => vec![[f64::midpoint(start, end), middle]],
     };
     let mut shapes = Vec::new();
-    if series.points.iter().any(|point| point.half_width > 0.0) {
+    if series.points.iter().any(Point::has_band) {
         let area = Rectangle {
             left: start,
             top: middle - 5.0,

@@ -3,7 +3,7 @@ use tiny_skia::Pixmap;
 use super::*;
 
 fn chart(mark: Mark, half_width: f64) -> LineChart {
-    let point = |x, y| Point { x, y, half_width };
+    let point = |x, y| Point::with_error(x, y, half_width);
     LineChart {
         title: "Losses < gains & more".into(),
         subtitle: String::new(),

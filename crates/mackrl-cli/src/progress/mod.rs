@@ -168,7 +168,7 @@ fn line(standing: &Standing, steps_env_at_start: u64, elapsed: Duration) -> Stri
 }
 
 /// Hours, minutes and seconds.
-fn clock(seconds: f64) -> String {
+pub(crate) fn clock(seconds: f64) -> String {
     let whole = Duration::from_secs_f64(seconds.clamp(0.0, 1e9)).as_secs();
     let (hours, minutes, seconds) = (whole / 3600, whole / 60 % 60, whole % 60);
     if hours > 0 {

@@ -1,5 +1,7 @@
 //! One command for each figure of the paper.
 
+pub(crate) mod ablations;
+pub(crate) mod all;
 mod claim;
 pub(crate) mod figure5;
 pub(crate) mod figure6;

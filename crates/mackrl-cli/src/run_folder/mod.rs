@@ -15,6 +15,7 @@
 
 mod checkpoints;
 mod disk;
+mod latest;
 mod manifest;
 mod run;
 
@@ -31,11 +32,12 @@ use serde::{Deserialize, Serialize};
 use crate::{failure::Failure, provenance::Provenance};
 use checkpoints::Surroundings;
 use disk::{Disk, RealDisk, cannot, cannot_write};
+pub(crate) use latest::{LatestRow, latest_row};
 use manifest::{Fingerprint, Growing};
 pub(crate) use run::Run;
 
 const CONFIG: &str = "config.toml";
-const METRICS: &str = "metrics.jsonl";
+pub(crate) const METRICS: &str = "metrics.jsonl";
 const RUN: &str = "run.json";
 const WEIGHTS: &str = "weights.safetensors";
 const LOCK: &str = "lock";
@@ -143,6 +145,20 @@ impl RunFolder {
         Self::check_free(path)?;
         disk::replace(&RealDisk, &path.join(CONFIG), config.to_toml().as_bytes())?;
         Self::open(path, config, threads, lock, 0)
+    }
+
+    /// Creates the folder of a new run for another process to make: with its configuration, and nothing else.
+    ///
+    /// # Errors
+    /// As [`RunFolder::create`].
+    pub(crate) fn prepare(path: &Path, config: &Config, threads: usize) -> anyhow::Result<()> {
+        Self::create(path, config, threads)?.set_status(Status::Interrupted)
+    }
+
+    /// Whether a process writes there now.
+    pub(crate) fn is_in_use(path: &Path) -> bool {
+        let lock = File::open(path.join(LOCK));
+        lock.is_ok_and(|lock| matches!(lock.try_lock(), Err(TryLockError::WouldBlock)))
     }
 
     /// Whether the run there has reached its end.
@@ -264,6 +280,37 @@ impl RunFolder {
     fn replace(&self, name: &str, content: &[u8]) -> anyhow::Result<()> {
         disk::replace(&*self.disk, &self.path.join(name), content)
     }
+}
+
+/// What can be said of a run without its weights.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Description {
+    /// How far it has come.
+    pub(crate) status: Status,
+    /// Where its results come from: one entry for each version of the program that went on with it.
+    pub(crate) provenance: Vec<Provenance>,
+}
+
+/// Whether a run lies in this folder.
+pub(crate) fn is_run(path: &Path) -> bool {
+    path.join(CONFIG).is_file()
+}
+
+/// Reads the configuration of the run at `path`, and what can be said of it.
+///
+/// # Errors
+/// [`Failure::NotARun`] if there is no configuration; otherwise what is wrong with it.
+pub(crate) fn read_description(path: &Path) -> anyhow::Result<(Config, Description)> {
+    let config = run::read_config(path)?;
+    let (status, mut provenance) = read_record(path)
+        .map_or((Status::Running, Vec::new()), |record| {
+            (record.status, record.provenance)
+        });
+    if provenance.is_empty() {
+        // Early versions did not say.
+        provenance.push(Provenance::of_unknown_code(&config));
+    }
+    Ok((config, Description { status, provenance }))
 }
 
 /// Puts `content` at `path`: whoever reads there, and whenever power is lost, finds the old content or the new.

@@ -10,24 +10,24 @@ use toml::{
 
 /// One value of a document, with the tables around it flattened into a path.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Leaf {
+pub struct Leaf {
     /// Names from the outermost table to the value.
-    pub(super) path: Vec<String>,
+    pub path: Vec<String>,
     /// The value; never a table.
-    pub(super) value: toml::Value,
+    pub value: toml::Value,
     /// Byte offset of the key.
-    pub(super) key_at: usize,
+    pub key_at: usize,
     /// Byte offset of the value.
-    pub(super) value_at: usize,
+    pub value_at: usize,
 }
 
 /// A document that is not TOML.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct SyntaxError {
+pub struct SyntaxError {
     /// What was found and expected.
-    pub(super) message: String,
+    pub message: String,
     /// Byte offset.
-    pub(super) at: usize,
+    pub at: usize,
 }
 
 impl From<toml::de::Error> for SyntaxError {
@@ -40,7 +40,10 @@ impl From<toml::de::Error> for SyntaxError {
 }
 
 /// The values of a TOML document, in the order in which they were written.
-pub(super) fn parse_document(text: &str) -> Result<Vec<Leaf>, SyntaxError> {
+///
+/// # Errors
+/// If it is not TOML, or an integer does not fit.
+pub fn parse_document(text: &str) -> Result<Vec<Leaf>, SyntaxError> {
     let mut leaves = Vec::new();
     collect(DeTable::parse(text)?.get_ref(), &[], &mut leaves)?;
     leaves.sort_by_key(|leaf| leaf.key_at);
@@ -95,7 +98,8 @@ fn collect_value(
 }
 
 /// Line and column, both from 1, of a byte offset; columns count characters.
-pub(super) fn line_and_column(text: &str, at: usize) -> (usize, usize) {
+#[must_use]
+pub fn line_and_column(text: &str, at: usize) -> (usize, usize) {
     let mut at = at.min(text.len());
     while !text.is_char_boundary(at) {
         at -= 1;

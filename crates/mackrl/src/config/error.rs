@@ -33,6 +33,11 @@ pub enum Origin {
         /// The flag with its value, such as `--set learner.gamma=2`.
         text: String,
     },
+    /// A value that follows from the world, because nobody asked for another.
+    Automatic {
+        /// Why it is what it is.
+        why: &'static str,
+    },
     /// A value that a program set.
     Unknown,
 }
@@ -45,6 +50,7 @@ impl fmt::Display for Origin {
                 write!(formatter, "preset {name}:{line}:{column}")
             }
             Self::File { name, line, column } => write!(formatter, "{name}:{line}:{column}"),
+            Self::Automatic { why } => write!(formatter, "automatic: {why}"),
             Self::CommandLine { text } => formatter.write_str(text),
             Self::Unknown => formatter.write_str("configuration"),
         }
@@ -142,10 +148,8 @@ fn suggestion(nearest: Option<&str>) -> String {
 /// The name among `candidates` that is most similar to `name`, if one is similar at all.
 ///
 /// Dotted keys are compared as a whole and by their last part, so that `gama` finds `learner.gamma`.
-pub(super) fn nearest<'a>(
-    name: &str,
-    candidates: impl IntoIterator<Item = &'a str>,
-) -> Option<String> {
+#[must_use]
+pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
     const SIMILAR: f64 = 0.6;
     let last = |key: &str| key.rsplit('.').next().unwrap_or_default().to_owned();
     let similarity = |candidate: &str| {

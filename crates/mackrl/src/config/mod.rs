@@ -27,10 +27,14 @@ mod settings;
 
 pub use builder::ConfigBuilder;
 pub use choices::{Algorithm, Engine, OptimiserKind, PartitionChoice};
+pub use document::{Leaf, SyntaxError, line_and_column, parse_document};
 pub use environment::EnvironmentConfig;
-pub use error::{ConfigError, Origin};
+pub use error::{ConfigError, Origin, nearest};
 pub use presets::{Preset, presets};
 pub use sections::{Config, ExplorationConfig, LearnerConfig, PolicyConfig, RunConfig, TestConfig};
 pub use settings::Setting;
 
-pub use crate::{common_knowledge::CommonKnowledgeFeatures, hierarchy::Delegation};
+pub use crate::{
+    common_knowledge::CommonKnowledgeFeatures,
+    hierarchy::{Delegation, Selection},
+};

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::{
     Algorithm, CommonKnowledgeFeatures, ConfigError, Delegation, EnvironmentConfig, OptimiserKind,
-    Origin, PartitionChoice, Setting,
+    Origin, PartitionChoice, Selection, Setting,
     settings::{Violation, section},
 };
 
@@ -33,8 +33,11 @@ section! {
         algorithm: Algorithm = Algorithm::Mackrl, "`mackrl` or `central-v`", |_| true;
         /// Which features of commonly known entities the controllers read: all of them, or those of the authors' code.
         common_knowledge: CommonKnowledgeFeatures = CommonKnowledgeFeatures::Complete, "`complete` or `thin`", |_| true;
-        /// Which partitions into pairs the pair selector chooses from; more than 8 agents have too many to take all.
+        /// Which partitions into pairs the pair selector chooses from. More than 8 agents have too many to take all; they take
+        /// `round-robin` unless something else is asked for.
         partitions: PartitionChoice = PartitionChoice::All, "`all`, `round-robin` or `sampled:K` with K >= 1", |_| true;
+        /// How a partition is chosen: the pair selector decides, or, as an ablation, all are equally likely.
+        selector: Selection = Selection::Learned, "`learned` or `uniform`", |_| true;
         /// When pairs delegate: their controllers decide, or, as ablations, always, or only where no joint action is commonly known.
         delegation: Delegation = Delegation::Learned, "`learned`, `always` or `never`", |_| true;
         /// Units in each hidden layer and each recurrent state.

@@ -101,11 +101,11 @@ impl PairwiseExecutor {
             hierarchy
                 .partitions
                 .in_force(&sampler.key, sampler.step, partition_buffer);
-        let chosen = self
-            .selector
-            .as_ref()
-            .map(|memory| sampler.choose_partition(memory.log_p(0)));
-        let mut pairs = partitions[chosen.unwrap_or(0)].pairs().iter();
+        let chosen = match &self.selector {
+            Some(memory) => sampler.choose_partition(memory.log_p(0)),
+            None => sampler.draw_partition(partitions.len()),
+        };
+        let mut pairs = partitions[chosen].pairs().iter();
         let pair = *pairs.find(|pair| self.own_pairs.contains(pair))?;
         let row = self.own_pairs.iter().position(|own| *own == pair)?;
         match sampler.choose_pair(pair, hierarchy.shape, self.pairs.log_p(row)) {

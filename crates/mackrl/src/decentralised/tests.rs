@@ -132,10 +132,11 @@ fn agents_on_their_own_play_the_central_run_on_every_map() {
 
 #[test]
 fn every_variant_of_the_hierarchy_is_decentralised() {
-    let variants: [&[&str]; 4] = [
+    let variants: [&[&str]; 5] = [
         &["env.map=2s3z"],
         &["env.map=2s3z", "policy.common_knowledge=thin"],
         &["env.map=2s3z", "policy.partitions=sampled:3"],
+        &["env.map=2s3z", "policy.selector=uniform"],
         &["env.map=2s3z", "policy.algorithm=central-v"],
     ];
     for variant in variants {

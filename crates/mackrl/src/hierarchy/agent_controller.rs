@@ -50,8 +50,10 @@ impl AgentController {
         observation.copy_from_slice(view.observation());
         write_one_hot(identity, Some(view.agent().index()));
         write_one_hot(previous, last_action.map(Action::index));
-        mask.copy_from_slice(view.available());
-        debug_assert_eq!(mask.len(), self.actions, "an agent's mask is [A]");
+        if let Some(mask) = mask {
+            mask.copy_from_slice(view.available());
+            debug_assert_eq!(mask.len(), self.actions, "an agent's mask is [A]");
+        }
     }
 }
 

@@ -64,9 +64,15 @@ pub(crate) struct ControllerMemory {
     row_of: Vec<usize>,
     previous_row_of: Vec<usize>,
     carry: Vec<usize>,
-    /// Rows before this step, of those that `log_p` and `softmax` hold.
-    first_row: usize,
+    /// Whether only the rows that are asked about have a distribution.
+    selective: bool,
+    /// Rows of this step.
     rows: usize,
+    /// Of a selective memory, the place of each row of this step among those that are asked about, or [`ABSENT`].
+    place_of: Vec<usize>,
+    /// Rows before this step, of those that `log_p` and `softmax` hold, and rows of this step that they hold.
+    first_asked: usize,
+    asked: usize,
     mask_rc: Vec<bool>,
     /// \[rows, C\], of all steps if they are recorded, else of this one.
     log_p_rc: Vec<f32>,
@@ -80,7 +86,7 @@ pub(crate) struct ControllerMemory {
 struct Choice {
     step: usize,
     environment: usize,
-    /// Row within its step.
+    /// Row within its step, of those that have a distribution.
     row: usize,
     column: usize,
     /// ∂ log p(u) / ∂ log p of the entry: a posterior probability.
@@ -98,18 +104,32 @@ impl Choice {
 }
 
 impl ControllerMemory {
+    /// Room for a controller of which every row is asked for its choice.
     pub(crate) fn new(controller: &Controller) -> Self {
+        Self::with_selection(controller, false)
+    }
+
+    /// Room for a controller of which all rows advance their recurrence at every step, but only those that [`ask`](Self::ask)
+    /// names are asked for their choice.
+    pub(crate) fn selective(controller: &Controller) -> Self {
+        Self::with_selection(controller, true)
+    }
+
+    fn with_selection(controller: &Controller, selective: bool) -> Self {
         let sizes = controller.network.sizes();
         Self {
             name: controller.name,
             sizes,
             recording: Recording::Off,
-            trace: Trace::new(sizes, Retention::LastStep),
+            trace: trace(sizes, Retention::LastStep, selective),
+            selective,
             row_of: Vec::new(),
             previous_row_of: Vec::new(),
             carry: Vec::new(),
-            first_row: 0,
             rows: 0,
+            place_of: Vec::new(),
+            first_asked: 0,
+            asked: 0,
             mask_rc: Vec::new(),
             log_p_rc: Vec::new(),
             softmax_rc: Vec::new(),
@@ -126,13 +146,14 @@ impl ControllerMemory {
                 Recording::ForLearning => Retention::Episode,
                 Recording::Off => Retention::LastStep,
             };
-            self.trace = Trace::new(self.sizes, retention);
+            self.trace = trace(self.sizes, retention, self.selective);
         }
         self.trace.begin_episode();
         self.previous_row_of.clear();
         self.row_of.clear();
-        self.first_row = 0;
         self.rows = 0;
+        self.first_asked = 0;
+        self.asked = 0;
         self.choices.clear();
     }
 
@@ -164,34 +185,67 @@ impl ControllerMemory {
         );
         let unchanged = is_first
             || self.carry.len() == self.rows && self.carry.iter().enumerate().all(|(i, &c)| i == c);
-        self.first_row = match self.recording {
-            Recording::ForLearning => self.first_row + self.rows,
+        self.first_asked = match self.recording {
+            Recording::ForLearning => self.first_asked + self.asked,
             Recording::Off => 0,
         };
         self.rows = self.carry.len();
         self.trace
             .begin_step(self.rows, (!unchanged).then_some(self.carry.as_slice()));
-        let columns = self.sizes.outputs;
-        grow(&mut self.mask_rc, self.rows * columns);
-        grow(&mut self.log_p_rc, (self.first_row + self.rows) * columns);
-        grow(&mut self.softmax_rc, (self.first_row + self.rows) * columns);
+        self.asked = if self.selective { 0 } else { self.rows };
+        self.place_of.clear();
+        self.make_room();
     }
 
-    /// The input and the mask of a row of this step, to be filled; the input is zero when the step begins.
+    /// Asks these rows of this step for their choice, and no others.
+    pub(crate) fn ask(&mut self, rows: &[usize]) {
+        self.trace.ask(rows);
+        self.place_of.resize(self.rows, ABSENT);
+        for (place, &row) in rows.iter().enumerate() {
+            self.place_of[row] = place;
+        }
+        self.asked = rows.len();
+        self.make_room();
+    }
+
+    /// The place of a row of this step among those that are asked about, if it is.
+    fn place(&self, row: usize) -> Option<usize> {
+        if self.selective {
+            let place = self.place_of.get(row).copied();
+            return place.filter(|&place| place != ABSENT);
+        }
+        Some(row)
+    }
+
+    fn make_room(&mut self) {
+        let columns = self.sizes.outputs;
+        grow(&mut self.mask_rc, self.asked * columns);
+        grow(
+            &mut self.log_p_rc,
+            (self.first_asked + self.asked) * columns,
+        );
+        grow(
+            &mut self.softmax_rc,
+            (self.first_asked + self.asked) * columns,
+        );
+    }
+
+    /// The input and the mask of a row of this step, to be filled; the input is zero when the step begins. A row that is not
+    /// asked for its choice has no mask.
     ///
     /// # Shapes
     /// Input \[F\], mask \[C\].
-    pub(crate) fn row_mut(&mut self, row: usize) -> (&mut [f32], &mut [bool]) {
+    pub(crate) fn row_mut(&mut self, row: usize) -> (&mut [f32], Option<&mut [bool]>) {
         let NetworkSizes {
             inputs, outputs, ..
         } = self.sizes;
-        (
-            &mut self.trace.input_mut()[row * inputs..(row + 1) * inputs],
-            &mut self.mask_rc[row * outputs..(row + 1) * outputs],
-        )
+        let mask = (self.place(row))
+            .map(|place| &mut self.mask_rc[place * outputs..(place + 1) * outputs]);
+        let input = &mut self.trace.input_mut()[row * inputs..(row + 1) * inputs];
+        (input, mask)
     }
 
-    /// Computes the log-probabilities of all rows of this step.
+    /// Computes the log-probabilities of all rows of this step that are asked for their choice.
     pub(crate) fn run(
         &mut self,
         controller: &Controller,
@@ -201,10 +255,10 @@ impl ControllerMemory {
         self.exploration = exploration;
         controller.network.step(weights, &mut self.trace);
         let columns = self.sizes.outputs;
-        let place = self.first_row * columns..(self.first_row + self.rows) * columns;
+        let place = self.first_asked * columns..(self.first_asked + self.asked) * columns;
         self.softmax().forward(
             self.trace.last_logits(),
-            &self.mask_rc[..self.rows * columns],
+            &self.mask_rc[..self.asked * columns],
             &mut self.log_p_rc[place.clone()],
             &mut self.softmax_rc[place],
         );
@@ -227,9 +281,13 @@ impl ControllerMemory {
     }
 
     /// The log-probabilities \[C\] of a row of this step.
+    ///
+    /// # Panics
+    /// If the row is not asked for its choice.
     pub(crate) fn log_p(&self, row: usize) -> &[f32] {
         let columns = self.sizes.outputs;
-        &self.log_p_rc[(self.first_row + row) * columns..(self.first_row + row + 1) * columns]
+        let place = self.place(row).expect("the row is asked for its choice");
+        &self.log_p_rc[(self.first_asked + place) * columns..][..columns]
     }
 
     /// The row of `instance` at this step, if it is there.
@@ -254,7 +312,7 @@ impl ControllerMemory {
     pub(crate) fn activations(&self) -> Vec<Named<'_, f32>> {
         let mut activations = self.trace.named(self.name);
         let columns = self.sizes.outputs;
-        let tables = &self.log_p_rc[..(self.first_row + self.rows) * columns];
+        let tables = &self.log_p_rc[..(self.first_asked + self.asked) * columns];
         let name = format!("{} log p", self.name);
         activations.push(Named::new(name, ["row", "column"], columns, tables));
         activations
@@ -269,6 +327,7 @@ impl ControllerMemory {
     pub(crate) fn record(&mut self, row: usize, column: usize, environment: usize, posterior: f32) {
         if posterior != 0.0 {
             let step = self.trace.steps() - 1;
+            let row = self.place(row).expect("the row was asked for its choice");
             self.choices.push(Choice {
                 step,
                 environment,
@@ -328,6 +387,14 @@ impl ControllerMemory {
     }
 }
 
+fn trace(sizes: NetworkSizes, retention: Retention, selective: bool) -> Trace<f32> {
+    if selective {
+        Trace::selective(sizes, retention)
+    } else {
+        Trace::new(sizes, retention)
+    }
+}
+
 /// Makes room for `len` elements; never shrinks.
 fn grow<T: Clone + Default>(buffer: &mut Vec<T>, len: usize) {
     if buffer.len() < len {
@@ -377,7 +444,7 @@ mod tests {
                 for (row, &instance) in instances.iter().enumerate() {
                     let (input, mask) = memory.row_mut(row);
                     input[instance % SIZES.inputs] = 1.0 + step as f32;
-                    mask.fill(true);
+                    mask.expect("all are asked").fill(true);
                 }
                 memory.run(&self.controller, &self.weights, 0.1);
                 if let Some(row) = memory.row_of(watched) {
@@ -413,6 +480,71 @@ mod tests {
         assert_ne!(alone[1], alone[2], "inputs change nothing");
         let (_, gone) = subject.play(&[&[0, 1, 4], &[1, 4], &[4]], 1);
         assert_eq!(gone.len(), 2, "an instance that left has no row");
+    }
+
+    /// Three rows over two steps, of which `asked` are asked, with one choice of row 1 at each step at which it is asked; gives
+    /// its log-probabilities and the gradient.
+    fn play_selectively(subject: &Subject, asked: [&[usize]; 2]) -> (Vec<Vec<f32>>, Vec<f32>) {
+        let everybody = asked == [&[0, 1, 2], &[0, 1, 2]];
+        let mut memory = if everybody {
+            ControllerMemory::new(&subject.controller)
+        } else {
+            ControllerMemory::selective(&subject.controller)
+        };
+        memory.begin(Recording::ForLearning);
+        let mut log_p = Vec::new();
+        for (step, rows) in asked.iter().enumerate() {
+            memory.begin_step([0, 1, 2]);
+            if !everybody {
+                memory.ask(rows);
+            }
+            for row in 0..3 {
+                let (input, mask) = memory.row_mut(row);
+                input[row] = 1.0 + step as f32;
+                assert_eq!(mask.is_some(), rows.contains(&row), "row {row}");
+                mask.into_iter().for_each(|mask| mask.fill(true));
+            }
+            memory.run(&subject.controller, &subject.weights, 0.1);
+            if step == 1 {
+                log_p.push(memory.log_p(1).to_vec());
+                memory.record(1, 1, 0, 0.75);
+                memory.record(0, 1, 0, 0.0);
+            }
+        }
+        let mut gradient = vec![0.0; subject.parameters];
+        let weight_bt = [vec![9.0, 0.5]];
+        memory.backward(
+            &subject.controller,
+            &subject.weights,
+            &weight_bt,
+            &mut gradient,
+        );
+        let tables = asked
+            .iter()
+            .map(|rows| rows.len() * SIZES.outputs)
+            .sum::<usize>();
+        let named = memory.activations();
+        assert_eq!(named.last().map(|table| table.values.len()), Some(tables));
+        assert_eq!(
+            memory.gradients()[0].values.len(),
+            tables,
+            "gradients of logits"
+        );
+        (log_p, gradient)
+    }
+
+    #[test]
+    fn rows_that_are_not_asked_change_nothing_for_those_that_are() {
+        let subject = Subject::new();
+        let everybody = play_selectively(&subject, [&[0, 1, 2], &[0, 1, 2]]);
+        assert!(everybody.1.iter().any(|&g| g != 0.0), "no gradient at all");
+        for asked in [[&[][..], &[1]], [&[2, 0], &[2, 1]], [&[1], &[1, 0]]] {
+            let some = play_selectively(&subject, asked);
+            assert_eq!(some.0, everybody.0, "{asked:?}");
+            for (some, all) in some.1.iter().zip(&everybody.1) {
+                assert!((some - all).abs() < 1e-7, "{asked:?}: {some} {all}");
+            }
+        }
     }
 
     #[test]

@@ -31,6 +31,7 @@ use self::{
 };
 pub use self::{
     pair_controller::Delegation,
+    pair_selector::Selection,
     sampling::{PairChoice, Path, Sampler},
 };
 use crate::{
@@ -48,6 +49,8 @@ pub struct HierarchySettings {
     pub common_knowledge: CommonKnowledgeFeatures,
     /// Which partitions there are.
     pub partitions: PartitionSchedule,
+    /// How one of them is chosen.
+    pub selector: Selection,
     /// When pairs may delegate.
     pub delegation: Delegation,
     /// H: width of the hidden layers and of the recurrent state, at least 1.
@@ -70,6 +73,7 @@ pub(crate) struct Hierarchy {
     /// The pairs that some partition contains, ascending.
     pub(crate) active_pairs: Vec<Pair>,
     pub(crate) layout: ParameterLayout,
+    /// Nothing where there is one partition, or all are equally likely.
     pub(crate) selector: Option<PairSelector>,
     pub(crate) pairs: PairController,
     pub(crate) agents: AgentController,
@@ -88,7 +92,8 @@ impl PairwiseMackrl {
     ) -> Result<Self, Error> {
         let partitions = settings.partitions.plan(spec.agents, seed)?;
         let mut layout = ParameterLayout::new();
-        let selector = (partitions.count() > 1).then(|| {
+        let is_chosen = partitions.count() > 1 && settings.selector == Selection::Learned;
+        let selector = is_chosen.then(|| {
             PairSelector::new(
                 &mut layout,
                 spec,

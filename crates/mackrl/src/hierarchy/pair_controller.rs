@@ -70,8 +70,8 @@ impl PairController {
         &self.controller
     }
 
-    /// Writes one row: what the pair commonly knows and who the members are, and which joint actions are commonly known
-    /// to be available.
+    /// Writes one row: what the pair commonly knows and who the members are, and, if it is asked for its choice, which joint
+    /// actions are commonly known to be available.
     ///
     /// `known` is the common knowledge of the pair, found by whichever member computes this; both write the same bits.
     pub(crate) fn write_row(
@@ -88,6 +88,9 @@ impl PairController {
         self.encoder.write_availability(known, &group, available_ga);
         self.encoder.encode(known, &group, available_ga, knowledge);
         write_identities(identities, self.shape.agents, &group);
+        let Some(mask) = mask else {
+            return;
+        };
         joint_mask(available_ga, mask);
         match self.delegation {
             Delegation::Learned => {}

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use mackrl_env::{AgentId, EnvironmentSpec, KnownEntities, PriorKnowledge};
+use serde::{Deserialize, Serialize};
 
 use super::{
     HierarchySettings,
@@ -12,6 +13,17 @@ use crate::{
     common_knowledge::GroupEncoder,
     nn::{NetworkSizes, ParameterLayout},
 };
+
+/// How the partition is chosen; anything but [`Selection::Learned`] is an ablation.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Selection {
+    /// The pair selector decides.
+    #[default]
+    Learned,
+    /// Each partition in force is as likely as any other, in greedy play too: a draw that all agents share, and no choice.
+    Uniform,
+}
 
 /// The pair selector. It exists only where there is more than one partition to choose from.
 #[derive(Debug, Clone)]
@@ -65,6 +77,6 @@ impl PairSelector {
         self.encoder
             .write_availability(known, &self.team, available_ga);
         self.encoder.encode(known, &self.team, available_ga, input);
-        mask.fill(true);
+        mask.into_iter().for_each(|mask| mask.fill(true));
     }
 }

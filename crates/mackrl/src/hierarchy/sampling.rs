@@ -54,6 +54,14 @@ impl Sampler {
         self.choose(log_p_p, Draw::Selector)
     }
 
+    /// One of `partitions` partitions, each as likely as any other; drawn from the shared seed in greedy mode too.
+    #[must_use]
+    pub fn draw_partition(&self, partitions: usize) -> usize {
+        let uniform = self.key.uniform(self.step, Draw::Selector);
+        let reached = |partition: &usize| uniform * (partitions as f64) < (partition + 1) as f64;
+        (0..partitions).find(reached).unwrap_or(partitions - 1)
+    }
+
     /// The choice of the controller of `pair`; the same for both members.
     ///
     /// # Shapes
@@ -103,13 +111,28 @@ impl Sampler {
         actions_n: &mut [Action],
         path: &mut Path,
     ) {
+        let partition = self.choose_partition(table.selector());
+        self.sample_within(partition, table, actions_n, path);
+    }
+
+    /// As [`Self::sample`], with the partition number `partition` of those in force.
+    ///
+    /// # Panics
+    /// As [`Self::sample`], or if there is no such partition.
+    pub fn sample_within<F: Real>(
+        &self,
+        partition: usize,
+        table: &PolicyTable<'_, F>,
+        actions_n: &mut [Action],
+        path: &mut Path,
+    ) {
         assert_eq!(
             actions_n.len(),
             table.shape().agents,
             "one action per agent"
         );
         let alone = |agent: AgentId| self.choose_action(agent, table.agent(agent.index()));
-        path.partition = self.choose_partition(table.selector());
+        path.partition = partition;
         path.delegated.clear();
         let partition = &table.partitions()[path.partition];
         for &pair in partition.pairs() {
@@ -200,6 +223,23 @@ mod tests {
     fn greedy_ties_go_to_the_lowest_index() {
         assert_eq!(most_probable(&[MASKED, -1.0, -0.5, -0.5, MASKED]), 2);
         assert_eq!(most_probable(&[MASKED, MASKED, -900.0]), 2);
+    }
+
+    #[test]
+    fn partitions_are_drawn_evenly_and_in_both_modes_alike() {
+        let mut counts = [0; 3];
+        for step in 0..3_000 {
+            let drawn = [Mode::Sampled, Mode::Greedy].map(|mode| {
+                let key = EpisodeKey::new(5, Stream::Training, 2);
+                Sampler { key, step, mode }.draw_partition(3)
+            });
+            assert_eq!(drawn[0], drawn[1]);
+            counts[drawn[0]] += 1;
+        }
+        // Five standard deviations: 5·√(3000·⅓·⅔) = 129.
+        for count in counts {
+            assert!((871..=1129).contains(&count), "{counts:?}");
+        }
     }
 
     #[test]

@@ -57,16 +57,16 @@ impl<E: Element> Trace<E> {
     /// The activations of all steps that are kept, in the order in which they were computed. After a backward pass the gates
     /// are their gradients.
     pub(crate) fn named(&self, model: &str) -> Vec<Named<'_, E>> {
-        let rows = self.steps.last().map_or(0, |step| step.rows.end);
+        let [rows, asked] = self.ends();
         let (inputs, hidden, outputs) = (self.sizes.inputs, self.sizes.hidden, self.sizes.outputs);
         [
-            ("inputs", inputs, &self.inputs),
-            ("input layer", hidden, &self.features),
-            ("gru gates", GATES * hidden, &self.gates),
-            ("gru hidden state", hidden, &self.hidden),
-            ("logits", outputs, &self.logits),
+            ("inputs", rows, inputs, &self.inputs),
+            ("input layer", rows, hidden, &self.features),
+            ("gru gates", rows, GATES * hidden, &self.gates),
+            ("gru hidden state", rows, hidden, &self.hidden),
+            ("logits", asked, outputs, &self.logits),
         ]
-        .map(|(name, columns, values)| {
+        .map(|(name, rows, columns, values)| {
             let values = &values.as_slice()[..rows * columns];
             Named::new(format!("{model} {name}"), ROWS, columns, values)
         })
@@ -76,17 +76,23 @@ impl<E: Element> Trace<E> {
     /// The gradients that the backward pass keeps, in the order in which it computes them: those of the logits and of the
     /// gates' pre-activations. To be asked after it.
     pub(crate) fn named_gradients(&self, model: &str) -> Vec<Named<'_, E>> {
-        let rows = self.steps.last().map_or(0, |step| step.rows.end);
+        let [rows, asked] = self.ends();
         let (hidden, outputs) = (self.sizes.hidden, self.sizes.outputs);
         [
-            ("logits", outputs, &self.logits_gradient),
-            ("gru gates", GATES * hidden, &self.gates),
+            ("logits", asked, outputs, &self.logits_gradient),
+            ("gru gates", rows, GATES * hidden, &self.gates),
         ]
-        .map(|(name, columns, values)| {
+        .map(|(name, rows, columns, values)| {
             let values = &values.as_slice()[..rows * columns];
             Named::new(format!("gradient of {model} {name}"), ROWS, columns, values)
         })
         .into()
+    }
+
+    /// Rows of all steps, and rows of their logits.
+    fn ends(&self) -> [usize; 2] {
+        let last = self.steps.last();
+        last.map_or([0, 0], |step| [step.rows.end, step.asked.end])
     }
 }
 

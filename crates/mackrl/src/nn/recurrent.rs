@@ -133,8 +133,23 @@ impl RecurrentNetwork {
             &mut trace.gates.as_mut_slice()[first * GATES * hidden..],
             next,
         );
-        let logits = &mut trace.logits.as_mut_slice()[first * outputs..];
-        self.output.forward(&weights.output, rows, next, logits);
+        let asked = trace.steps.last().expect("a step was begun").asked.clone();
+        if asked.is_empty() {
+            return;
+        }
+        let logits = &mut trace.logits.as_mut_slice()[asked.start * outputs..];
+        let states = if trace.selective {
+            let states = &mut trace.asked_hidden.as_mut_slice()[asked.start * hidden..];
+            let gathered = states.chunks_exact_mut(hidden);
+            for (state, &row) in gathered.zip(&trace.asked[asked.clone()]) {
+                state.copy_from_slice(&trace.hidden.as_slice()[row * hidden..][..hidden]);
+            }
+            &*states
+        } else {
+            &*next
+        };
+        self.output
+            .forward(&weights.output, asked.len(), states, logits);
     }
 
     /// Back-propagates the gradients of the logits through all steps and adds the parameters' gradients to the flat
@@ -176,6 +191,8 @@ impl RecurrentNetwork {
                 trace.carry_gradient_back(t);
             }
             if !rows.is_empty() {
+                let asked = trace.steps[block.start].asked.start..trace.steps[end - 1].asked.end;
+                self.output_gradient(trace, asked, gradient);
                 self.parameter_gradient(trace, rows, gradient);
             }
             end = block.start;
@@ -190,21 +207,16 @@ impl RecurrentNetwork {
         t: usize,
         block_start: usize,
     ) {
-        let NetworkSizes {
-            hidden, outputs, ..
-        } = trace.sizes;
+        let hidden = trace.sizes.hidden;
         let first = trace.steps[t].rows.start;
         let rows = trace.steps[t].rows.len();
+        self.output_backward(weights, trace, t);
         let Workspace {
             features_gradient,
             hidden_gradient,
             ..
         } = &mut trace.workspace;
         let hidden_gradient = hidden_gradient.as_mut_slice();
-        let logits_gradient = &trace.logits_gradient.as_slice()[first * outputs..];
-        self.output
-            .input_gradient(&weights.output, rows, logits_gradient, hidden_gradient);
-
         let gates = &mut trace.gates.as_mut_slice()[first * GATES * hidden..];
         let previous = &trace.previous.as_slice()[first * hidden..];
         self.gru
@@ -221,29 +233,90 @@ impl RecurrentNetwork {
         });
     }
 
-    /// Adds the gradients of all parameters over some rows of a trace whose gates already are gradients.
+    /// Adds what the logits of step `t` say to the gradient of its hidden state.
+    fn output_backward<E: Element>(
+        &self,
+        weights: &RecurrentWeights<E>,
+        trace: &mut Trace<E>,
+        t: usize,
+    ) {
+        let NetworkSizes {
+            hidden, outputs, ..
+        } = trace.sizes;
+        let Step { rows, asked, .. } = &trace.steps[t];
+        if asked.is_empty() {
+            return;
+        }
+        let Workspace {
+            hidden_gradient,
+            asked_gradient,
+            ..
+        } = &mut trace.workspace;
+        let logits_gradient = &trace.logits_gradient.as_slice()[asked.start * outputs..];
+        let count = asked.len();
+        if !trace.selective {
+            let gradient = hidden_gradient.as_mut_slice();
+            self.output
+                .input_gradient(&weights.output, count, logits_gradient, gradient);
+            return;
+        }
+        asked_gradient.grow(count * hidden);
+        asked_gradient.as_mut_slice()[..count * hidden].fill(E::ZERO);
+        let gradients = asked_gradient.as_mut_slice();
+        self.output
+            .input_gradient(&weights.output, count, logits_gradient, gradients);
+        let places = trace.asked[asked.clone()]
+            .iter()
+            .map(|row| row - rows.start);
+        for (place, terms) in places.zip(gradients.chunks_exact(hidden)) {
+            let sums = &mut hidden_gradient.as_mut_slice()[place * hidden..][..hidden];
+            for (sum, &term) in sums.iter_mut().zip(terms) {
+                *sum += term;
+            }
+        }
+    }
+
+    /// Adds the gradients of the last layer's parameters over some rows of logits.
+    fn output_gradient<E: Element>(
+        &self,
+        trace: &mut Trace<E>,
+        asked: Range<usize>,
+        gradient: &mut [E],
+    ) {
+        if asked.is_empty() {
+            return;
+        }
+        let NetworkSizes {
+            hidden, outputs, ..
+        } = trace.sizes;
+        let states = if trace.selective {
+            &trace.asked_hidden
+        } else {
+            &trace.hidden
+        };
+        self.output.parameter_gradient(
+            asked.len(),
+            &states.as_slice()[asked.start * hidden..],
+            &trace.logits_gradient.as_slice()[asked.start * outputs..],
+            gradient,
+            &mut trace.workspace.scratch,
+        );
+    }
+
+    /// Adds the gradients of the other layers' parameters over some rows of a trace whose gates already are gradients.
     fn parameter_gradient<E: Element>(
         &self,
         trace: &mut Trace<E>,
         rows: Range<usize>,
         gradient: &mut [E],
     ) {
-        let NetworkSizes {
-            inputs,
-            hidden,
-            outputs,
-        } = trace.sizes;
+        let NetworkSizes { inputs, hidden, .. } = trace.sizes;
         let (first, count) = (rows.start, rows.len());
         let Workspace {
             features_gradient,
             scratch,
             ..
         } = &mut trace.workspace;
-        let logits_gradient = &trace.logits_gradient.as_slice()[first * outputs..];
-        let state = &trace.hidden.as_slice()[first * hidden..];
-        self.output
-            .parameter_gradient(count, state, logits_gradient, gradient, scratch);
-
         let features = &trace.features.as_slice()[first * hidden..];
         let previous = &trace.previous.as_slice()[first * hidden..];
         let gates = &trace.gates.as_slice()[first * GATES * hidden..];

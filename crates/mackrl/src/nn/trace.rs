@@ -25,6 +25,8 @@ pub enum Retention {
 pub(crate) struct Step {
     /// Its rows among those of all steps.
     pub(crate) rows: Range<usize>,
+    /// Its rows of logits among those of all steps.
+    pub(crate) asked: Range<usize>,
     /// Whether row i continues row i of the previous step, for every i.
     pub(crate) unchanged: bool,
 }
@@ -34,6 +36,8 @@ pub(crate) struct Step {
 pub struct Trace<R> {
     pub(crate) sizes: NetworkSizes,
     retention: Retention,
+    /// Whether only the rows that are asked for get logits.
+    pub(crate) selective: bool,
     steps_begun: usize,
     pub(crate) steps: Vec<Step>,
     /// For every row, the row of the previous step that it continues.
@@ -48,9 +52,13 @@ pub struct Trace<R> {
     pub(crate) gates: Aligned<R>,
     /// [rows, hidden]
     pub(crate) hidden: Aligned<R>,
-    /// [rows, outputs]
+    /// For every row of logits of a selective trace, its row among those of all steps.
+    pub(crate) asked: Vec<usize>,
+    /// [rows of logits, hidden], the hidden states of those rows of a selective trace.
+    pub(crate) asked_hidden: Aligned<R>,
+    /// [rows of logits, outputs]
     pub(crate) logits: Aligned<R>,
-    /// [rows, outputs]
+    /// [rows of logits, outputs]
     pub(crate) logits_gradient: Aligned<R>,
     pub(crate) workspace: Workspace<R>,
 }
@@ -64,16 +72,30 @@ pub(crate) struct Workspace<R> {
     pub(crate) hidden_gradient: Aligned<R>,
     /// [rows of a step, hidden]
     pub(crate) carried_gradient: Aligned<R>,
+    /// [rows of logits of a step, hidden]
+    pub(crate) asked_gradient: Aligned<R>,
     pub(crate) scratch: Aligned<R>,
 }
 
 impl<R: Real> Trace<R> {
-    /// An empty trace for networks of these sizes.
+    /// An empty trace for networks of these sizes, in which every row has logits.
     #[must_use]
     pub fn new(sizes: NetworkSizes, retention: Retention) -> Self {
+        Self::with_selection(sizes, retention, false)
+    }
+
+    /// An empty trace in which only those rows have logits that [`ask`](Self::ask) names: recurrences advance in all rows, but
+    /// the last layer, the widest where there are many actions, is computed for a few of them.
+    #[must_use]
+    pub fn selective(sizes: NetworkSizes, retention: Retention) -> Self {
+        Self::with_selection(sizes, retention, true)
+    }
+
+    fn with_selection(sizes: NetworkSizes, retention: Retention, selective: bool) -> Self {
         Self {
             sizes,
             retention,
+            selective,
             steps_begun: 0,
             steps: Vec::new(),
             carry: Vec::new(),
@@ -82,6 +104,8 @@ impl<R: Real> Trace<R> {
             previous: Aligned::default(),
             gates: Aligned::default(),
             hidden: Aligned::default(),
+            asked: Vec::new(),
+            asked_hidden: Aligned::default(),
             logits: Aligned::default(),
             logits_gradient: Aligned::default(),
             workspace: Workspace::default(),
@@ -93,6 +117,7 @@ impl<R: Real> Trace<R> {
         self.steps_begun = 0;
         self.steps.clear();
         self.carry.clear();
+        self.asked.clear();
     }
 
     /// Begins a step of `rows` rows whose inputs are all zero.
@@ -103,14 +128,16 @@ impl<R: Real> Trace<R> {
     /// # Panics
     /// If `carry` does not have one entry a row, or an entry (or, without `carry`, a row) that the previous step lacks.
     pub fn begin_step(&mut self, rows: usize, carry: Option<&[usize]>) {
-        let previous = self.steps.last().map(|step| step.rows.clone());
-        let start = match (self.retention, &previous) {
-            (Retention::Episode, Some(previous)) => previous.end,
-            _ => 0,
+        let last = self.steps.last();
+        let [start, first_asked] = match (self.retention, last) {
+            (Retention::Episode, Some(last)) => [last.rows.end, last.asked.end],
+            _ => [0, 0],
         };
+        let previous = last.map(|step| step.rows.clone());
         if self.retention == Retention::LastStep {
             self.steps.clear();
             self.carry.clear();
+            self.asked.clear();
         }
         self.grow(start + rows);
         let h = self.sizes.hidden;
@@ -137,11 +164,34 @@ impl<R: Real> Trace<R> {
         let inputs = self.sizes.inputs;
         self.inputs.as_mut_slice()[start * inputs..][..rows * inputs].fill(R::ZERO);
         let unchanged = carry.is_none() && previous.is_none_or(|previous| previous.len() == rows);
+        let asked = if self.selective { 0 } else { rows };
+        self.logits.grow((first_asked + asked) * self.sizes.outputs);
         self.steps.push(Step {
             rows: start..start + rows,
+            asked: first_asked..first_asked + asked,
             unchanged,
         });
         self.steps_begun += 1;
+    }
+
+    /// Asks for logits of these rows of the current step, in this order; row i of the step's logits is that of `rows[i]`. Of a
+    /// step that is not asked about, no logits are computed.
+    ///
+    /// # Panics
+    /// If the trace is not selective, no step was begun, the step was asked about before, or a row is none of the step's.
+    pub fn ask(&mut self, rows: &[usize]) {
+        assert!(self.selective, "every row of this trace has logits");
+        let step = self.steps.last_mut().expect("a step was begun");
+        assert!(step.asked.is_empty(), "a step is asked about once");
+        assert!(
+            rows.iter().all(|&row| row < step.rows.len()),
+            "rows of the current step"
+        );
+        step.asked.end += rows.len();
+        let (first, end) = (step.rows.start, step.asked.end);
+        self.asked.extend(rows.iter().map(|row| first + row));
+        self.logits.grow(end * self.sizes.outputs);
+        self.asked_hidden.grow(end * self.sizes.hidden);
     }
 
     /// The inputs of the current step [rows, inputs], to be filled; all zero when the step begins.
@@ -187,39 +237,45 @@ impl<R: Real> Trace<R> {
         rows_of(&self.hidden, self.rows_of(t), self.sizes.hidden)
     }
 
-    /// The logits of step `t` [rows, outputs].
+    /// The logits of step `t` [rows, outputs], or of the rows that were asked for.
     ///
     /// # Panics
     /// If the trace does not hold step `t`.
     #[must_use]
     pub fn logits(&self, t: usize) -> &[R] {
-        rows_of(&self.logits, self.rows_of(t), self.sizes.outputs)
+        rows_of(&self.logits, self.step(t).asked.clone(), self.sizes.outputs)
     }
 
-    /// The logits of the current step [rows, outputs].
+    /// The logits of the current step [rows, outputs], or of the rows that were asked for.
     ///
     /// # Panics
     /// If no step was begun.
     #[must_use]
     pub fn last_logits(&self) -> &[R] {
-        rows_of(&self.logits, self.last_rows(), self.sizes.outputs)
+        let asked = self.last_step().asked.clone();
+        rows_of(&self.logits, asked, self.sizes.outputs)
     }
 
-    /// The place for the gradient of the logits of step `t` [rows, outputs], to be filled before the backward pass. It holds
-    /// numbers of earlier episodes: write every element.
+    /// The place for the gradient of the logits of step `t` [rows, outputs] (or of the rows that were asked for), to be filled
+    /// before the backward pass. It holds numbers of earlier episodes: write every element.
     ///
     /// # Panics
     /// If the trace does not hold step `t`.
     pub fn logits_gradient_mut(&mut self, t: usize) -> &mut [R] {
-        let rows = self.rows_of(t);
+        let rows = self.step(t).asked.clone();
         let outputs = self.sizes.outputs;
-        self.logits_gradient.grow(self.last_rows().end * outputs);
+        self.logits_gradient
+            .grow(self.last_step().asked.end * outputs);
         &mut self.logits_gradient.as_mut_slice()[rows.start * outputs..rows.end * outputs]
     }
 
     /// The rows of the current step among all that are kept.
     pub(crate) fn last_rows(&self) -> Range<usize> {
-        self.steps.last().expect("a step was begun").rows.clone()
+        self.last_step().rows.clone()
+    }
+
+    pub(crate) fn last_step(&self) -> &Step {
+        self.steps.last().expect("a step was begun")
     }
 
     /// Gives each row of the step before `t` the sum of the hidden state's gradients of the rows that continue it.
@@ -247,22 +303,21 @@ impl<R: Real> Trace<R> {
     }
 
     fn rows_of(&self, t: usize) -> Range<usize> {
+        self.step(t).rows.clone()
+    }
+
+    fn step(&self, t: usize) -> &Step {
         let forgotten = self.steps_begun - self.steps.len();
-        self.steps[t - forgotten].rows.clone()
+        &self.steps[t - forgotten]
     }
 
     fn grow(&mut self, rows: usize) {
-        let NetworkSizes {
-            inputs,
-            hidden,
-            outputs,
-        } = self.sizes;
+        let NetworkSizes { inputs, hidden, .. } = self.sizes;
         self.inputs.grow(rows * inputs);
         self.features.grow(rows * hidden);
         self.previous.grow(rows * hidden);
         self.gates.grow(rows * GATES * hidden);
         self.hidden.grow(rows * hidden);
-        self.logits.grow(rows * outputs);
     }
 }
 

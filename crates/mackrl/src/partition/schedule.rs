@@ -92,6 +92,12 @@ impl Partitions {
         self.fixed.len().max(1)
     }
 
+    /// Whether the same partitions are in force at every step, so that every possible pair can be formed at every step.
+    #[must_use]
+    pub const fn are_fixed(&self) -> bool {
+        !self.fixed.is_empty()
+    }
+
     /// The pairs that may be formed at some step, ascending by index.
     #[must_use]
     pub fn possible_pairs(&self) -> Vec<Pair> {

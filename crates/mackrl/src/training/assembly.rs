@@ -120,6 +120,7 @@ pub fn policy(config: &Config, world: &World) -> Result<Box<dyn Decentralised>, 
             let settings = HierarchySettings {
                 common_knowledge: config.policy.common_knowledge,
                 partitions: config.policy.partitions.into(),
+                selector: config.policy.selector,
                 delegation: config.policy.delegation,
                 hidden,
             };

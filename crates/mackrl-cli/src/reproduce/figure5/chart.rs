@@ -83,16 +83,12 @@ fn all_series(report: &Figure5Report) -> Vec<Series> {
 
 fn exact(points: &[f64], values: &[f64]) -> Vec<Point> {
     (points.iter().zip(values))
-        .map(|(&x, &y)| Point {
-            x,
-            y,
-            half_width: 0.0,
-        })
+        .map(|(&x, &y)| Point::exact(x, y))
         .collect()
 }
 
 fn measured(points: &[f64], curve: &Curve) -> Vec<Point> {
     (points.iter().zip(curve.mean.iter().zip(&curve.sem)))
-        .map(|(&x, (&y, &half_width))| Point { x, y, half_width })
+        .map(|(&x, (&y, &error))| Point::with_error(x, y, error))
         .collect()
 }

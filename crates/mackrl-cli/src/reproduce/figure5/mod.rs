@@ -24,6 +24,7 @@ use findings::Findings;
 use report::Delegation;
 
 use super::write;
+use crate::plot::LineChart;
 
 /// Probabilities of common knowledge, as published.
 fn points() -> Vec<f64> {
@@ -45,12 +46,19 @@ pub(crate) fn run(
     fs::create_dir_all(&options.out)
         .with_context(|| format!("creating the folder {}", options.out.display()))?;
     let report = compute(options, progress)?;
-    let chart = chart::chart(&report);
+    let chart = report.chart();
     let json = serde_json::to_string_pretty(&report).context("writing the report as JSON")? + "\n";
     write(&options.out, "figure5.json", json.as_bytes())?;
     write(&options.out, "figure5.svg", chart.to_svg().as_bytes())?;
     write(&options.out, "figure5.png", &chart.to_png()?)?;
     Ok(report)
+}
+
+impl Figure5Report {
+    /// The figure.
+    pub(crate) fn chart(&self) -> LineChart {
+        chart::chart(self)
+    }
 }
 
 /// Runs everything and writes nothing.

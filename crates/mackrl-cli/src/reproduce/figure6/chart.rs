@@ -50,11 +50,7 @@ fn emptiest_corner(panel: &Panel) -> Corner {
 
 fn measured(steps: &[u64], curve: &Curve) -> Vec<Point> {
     (steps.iter().zip(curve.mean.iter().zip(&curve.sem)))
-        .map(|(&step, (&y, &half_width))| Point {
-            x: step as f64,
-            y,
-            half_width,
-        })
+        .map(|(&step, (&y, &error))| Point::with_error(step as f64, y, error))
         .collect()
 }
 
@@ -62,10 +58,6 @@ fn measured(steps: &[u64], curve: &Curve) -> Vec<Point> {
 fn published(steps: &[u64], values: &[f64], last: u64) -> Vec<Point> {
     (steps.iter().zip(values))
         .filter(|&(&step, _)| step <= last)
-        .map(|(&step, &y)| Point {
-            x: step as f64,
-            y,
-            half_width: 0.0,
-        })
+        .map(|(&step, &y)| Point::exact(step as f64, y))
         .collect()
 }

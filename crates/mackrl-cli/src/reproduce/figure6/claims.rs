@@ -3,13 +3,11 @@
 use mackrl::statistics::mean;
 
 use super::MapRuns;
-use crate::reproduce::{
-    Claim, ClaimSource,
-    learning::{Difference, TrainingRun},
+use crate::{
+    recorded::{TrainingRun, final_mean, share_of},
+    reproduce::{Claim, ClaimSource, learning::Difference},
 };
 
-/// Share of the tests at the end of training whose mean is a run's final win rate.
-const FINAL_SHARE: f64 = 0.1;
 /// Share of the tests at the beginning of training that "initially" means.
 const INITIAL_SHARE: f64 = 0.1;
 /// "Above 90 %".
@@ -88,38 +86,14 @@ fn mackrl_learns_faster(map: &str, runs: &MapRuns<'_>) -> Claim {
 
 /// Each run's mean over the last tests.
 fn finals(runs: &[TrainingRun]) -> Vec<f64> {
-    let last = |run: &TrainingRun| {
-        let won = &run.battle_won;
-        mean(&won[won.len() - some_of(won.len(), FINAL_SHARE)..])
-    };
-    runs.iter().map(last).collect()
+    (runs.iter().map(|run| final_mean(&run.battle_won))).collect()
 }
 
 /// Each run's mean over the first tests after the one before training.
 fn initials(runs: &[TrainingRun]) -> Vec<f64> {
     let first = |run: &TrainingRun| {
         let won = &run.battle_won[1.min(run.battle_won.len() - 1)..];
-        mean(&won[..some_of(won.len(), INITIAL_SHARE)])
+        mean(&won[..share_of(won.len(), INITIAL_SHARE)])
     };
     runs.iter().map(first).collect()
-}
-
-/// A share of `count`, rounded up: at least one.
-fn some_of(count: usize, share: f64) -> usize {
-    (1..=count)
-        .find(|&part| part as f64 >= share * count as f64)
-        .unwrap_or(count)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_tenth_is_at_least_one_test() {
-        assert_eq!(
-            [1, 5, 10, 11, 101].map(|count| some_of(count, 0.1)),
-            [1, 1, 1, 2, 11]
-        );
-    }
 }

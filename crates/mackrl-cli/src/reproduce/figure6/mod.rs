@@ -17,10 +17,10 @@ use serde::Serialize;
 
 use super::{
     Claim,
-    learning::{Curve, Job, Learner, LearningOptions, TrainingRun, train_all},
+    learning::{Curve, Job, Learner, LearningOptions, train_all},
     write,
 };
-use crate::provenance::Provenance;
+use crate::{plot::LineChart, provenance::Provenance, recorded::TrainingRun};
 use published::Published;
 
 /// Maps of the figure.
@@ -83,21 +83,17 @@ struct MapRuns<'a> {
 ///
 /// # Errors
 /// If a run fails or a file cannot be written.
-pub(crate) fn run(
-    options: &Figure6Options,
-    progress: &(dyn Fn(usize, usize) + Sync),
-) -> anyhow::Result<Figure6Report> {
+pub(crate) fn run(options: &Figure6Options) -> anyhow::Result<Figure6Report> {
     let options = options.learning.resolved();
     // A folder that cannot be written should be found out before the work, not after it.
     fs::create_dir_all(&options.out)
         .with_context(|| format!("creating the folder {}", options.out.display()))?;
     let jobs = jobs(&options);
-    let runs = train_all(&jobs, &options, progress)?;
+    let runs = train_all(&jobs, &options)?;
     let report = report(&options, &runs);
     let json = serde_json::to_string_pretty(&report)? + "\n";
     write(&options.out, "figure6.json", json.as_bytes())?;
-    for panel in &report.panels {
-        let chart = chart::chart(panel, &report.steps);
+    for (panel, chart) in report.panels.iter().zip(report.charts()) {
         let name = |ending| format!("figure6-{}.{ending}", panel.map);
         write(&options.out, &name("svg"), chart.to_svg().as_bytes())?;
         write(&options.out, &name("png"), &chart.to_png()?)?;
@@ -110,7 +106,7 @@ fn jobs(options: &LearningOptions) -> Vec<Job> {
     let mut jobs = Vec::new();
     for map in MAPS {
         for learner in LEARNERS {
-            jobs.extend((1..=options.seeds).map(|seed| Job { map, learner, seed }));
+            jobs.extend((1..=options.seeds).map(|seed| Job::of_learner(map, learner, seed)));
         }
     }
     jobs
@@ -139,11 +135,19 @@ fn report(options: &LearningOptions, runs: &[TrainingRun]) -> Figure6Report {
         command: options.command("figure6"),
         provenance: TrainingRun::provenance_of(runs),
         seeds: options.seeds,
-        steps: (0..tests as u64)
-            .map(|test| (test * options.interval).min(options.steps))
-            .collect(),
+        steps: options.steps_of(tests),
         claims: claims::claims(&maps[0], &maps[1]),
         panels,
+    }
+}
+
+impl Figure6Report {
+    /// A chart for each map.
+    pub(crate) fn charts(&self) -> Vec<LineChart> {
+        let panels = self.panels.iter();
+        panels
+            .map(|panel| chart::chart(panel, &self.steps))
+            .collect()
     }
 }
 

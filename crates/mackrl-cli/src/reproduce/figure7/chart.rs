@@ -41,11 +41,7 @@ fn points(moment: &Moment) -> Vec<Point> {
     let rates = moment.rates.iter().enumerate();
     rates
         .filter_map(|(enemies, rate)| {
-            Some(Point {
-                x: enemies as f64,
-                y: rate.mean?,
-                half_width: rate.sem?,
-            })
+            Some(Point::with_error(enemies as f64, rate.mean?, rate.sem?))
         })
         .collect()
 }

@@ -16,10 +16,10 @@ use serde::Serialize;
 
 use super::{
     Claim,
-    learning::{Job, Learner, LearningOptions, TrainingRun, train_all},
+    learning::{Job, Learner, LearningOptions, train_all},
     write,
 };
-use crate::provenance::Provenance;
+use crate::{plot::LineChart, provenance::Provenance, recorded::TrainingRun};
 
 /// Enemies on the map.
 const ENEMIES: usize = 5;
@@ -90,27 +90,27 @@ pub(crate) struct Rate {
 ///
 /// # Errors
 /// If a run fails or a file cannot be written.
-pub(crate) fn run(
-    options: &Figure7Options,
-    progress: &(dyn Fn(usize, usize) + Sync),
-) -> anyhow::Result<Figure7Report> {
+pub(crate) fn run(options: &Figure7Options) -> anyhow::Result<Figure7Report> {
     let options = options.learning.resolved();
     fs::create_dir_all(&options.out)
         .with_context(|| format!("creating the folder {}", options.out.display()))?;
-    let job = |seed| Job {
-        map: "2s3z",
-        learner: Learner::Mackrl,
-        seed,
-    };
+    let job = |seed| Job::of_learner("2s3z", Learner::Mackrl, seed);
     let jobs: Vec<Job> = (1..=options.seeds).map(job).collect();
-    let runs = train_all(&jobs, &options, progress)?;
+    let runs = train_all(&jobs, &options)?;
     let report = report(&options, &runs);
-    let chart = chart::chart(&report);
+    let chart = report.chart();
     let json = serde_json::to_string_pretty(&report)? + "\n";
     write(&options.out, "figure7.json", json.as_bytes())?;
     write(&options.out, "figure7.svg", chart.to_svg().as_bytes())?;
     write(&options.out, "figure7.png", &chart.to_png()?)?;
     Ok(report)
+}
+
+impl Figure7Report {
+    /// The figure.
+    pub(crate) fn chart(&self) -> LineChart {
+        chart::chart(self)
+    }
 }
 
 fn report(options: &LearningOptions, runs: &[TrainingRun]) -> Figure7Report {

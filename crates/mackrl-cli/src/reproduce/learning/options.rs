@@ -80,6 +80,13 @@ impl LearningOptions {
         self.jobs.unwrap_or_else(processors)
     }
 
+    /// Environment steps at which `tests` tests are due.
+    #[must_use]
+    pub(crate) fn steps_of(&self, tests: usize) -> Vec<u64> {
+        let due = |test: u64| (test * self.interval).min(self.steps);
+        (0..tests as u64).map(due).collect()
+    }
+
     /// The command that repeats this result, whatever the folder and the number of jobs.
     #[must_use]
     pub(crate) fn command(&self, figure: &str) -> String {

@@ -4,11 +4,17 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
-use crate::config::{
-    Config, ConfigError, Origin, Preset,
-    document::{Leaf, SyntaxError, line_and_column, parse_assignment, parse_document},
-    error::nearest,
+use crate::{
+    config::{
+        Config, ConfigError, Origin, PartitionChoice, Preset,
+        document::{Leaf, SyntaxError, line_and_column, parse_assignment, parse_document},
+        error::nearest,
+    },
+    partition::PartitionSchedule,
 };
+
+/// The setting that depends on the size of the team.
+const PARTITIONS: &str = "policy.partitions";
 
 /// Lays settings over each other, later ones over earlier ones, and remembers where each came from.
 ///
@@ -83,10 +89,18 @@ impl ConfigBuilder {
     ///
     /// # Errors
     /// As [`ConfigBuilder::set`]; the error names `typed`.
-    pub fn flag(mut self, typed: &str, assignment: &str) -> Result<Self, ConfigError> {
+    pub fn flag(self, typed: &str, assignment: &str) -> Result<Self, ConfigError> {
         let origin = Origin::CommandLine {
             text: typed.to_owned(),
         };
+        self.assign(origin, assignment)
+    }
+
+    /// As [`ConfigBuilder::set`], for a value that was written at `origin`.
+    ///
+    /// # Errors
+    /// As [`ConfigBuilder::set`]; the error names `origin`.
+    pub fn assign(mut self, origin: Origin, assignment: &str) -> Result<Self, ConfigError> {
         let leaves = parse_assignment(assignment).map_err(|SyntaxError { message, .. }| {
             ConfigError::Syntax {
                 origin: origin.clone(),
@@ -124,16 +138,45 @@ impl ConfigBuilder {
     /// # Panics
     /// Never: every value is checked when it is laid.
     pub fn build(&self) -> Result<Config, ConfigError> {
-        let config = Config::deserialize(self.table.clone())
+        let mut config = Config::deserialize(self.table.clone())
             .expect("every value was checked when it was laid");
-        config.validate_with(|key| self.origin(key))?;
+        config.validate_with(|key| self.written(key))?;
+        if let Some(partitions) = self.automatic_partitions() {
+            config.policy.partitions = partitions;
+        }
         Ok(config)
     }
 
-    /// Where the value at `key` was written.
+    /// Where the value at `key` comes from.
     #[must_use]
     pub fn origin(&self, key: &str) -> Origin {
+        if key == PARTITIONS && self.automatic_partitions().is_some() {
+            return Origin::Automatic {
+                why: "more than 8 agents have too many partitions to take all",
+            };
+        }
+        self.written(key)
+    }
+
+    /// Where the value at `key` was written.
+    fn written(&self, key: &str) -> Origin {
         self.origins.get(key).cloned().unwrap_or(Origin::BuiltIn)
+    }
+
+    /// The partitions of a team with too many to take all, unless somebody asked for particular ones: presets are written
+    /// for small teams.
+    fn automatic_partitions(&self) -> Option<PartitionChoice> {
+        let config = Config::deserialize(self.table.clone()).ok()?;
+        let was_asked = !matches!(
+            self.written(PARTITIONS),
+            Origin::BuiltIn | Origin::Preset { .. }
+        );
+        if was_asked || config.policy.partitions != PartitionChoice::All {
+            return None;
+        }
+        let agents = config.env.make().ok()?.spec().agents;
+        let too_many = agents > PartitionSchedule::MOST_AGENTS_ENUMERATED;
+        too_many.then_some(PartitionChoice::RoundRobin)
     }
 
     fn document(

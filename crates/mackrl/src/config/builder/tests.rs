@@ -240,3 +240,24 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn large_teams_take_turns_unless_something_else_is_asked_for() {
+    let partitions = |settings: &[&str]| {
+        let builder = ConfigBuilder::new().preset("paper").unwrap();
+        let builder = (settings.iter()).try_fold(builder, |builder, setting| builder.set(setting));
+        let builder = builder.unwrap();
+        let origin = builder.origin("policy.partitions").to_string();
+        (builder.build().unwrap().policy.partitions, origin)
+    };
+    let (large, origin) = partitions(&["env.map=27m_vs_30m"]);
+    assert_eq!(large, PartitionChoice::RoundRobin);
+    assert!(origin.starts_with("automatic: "), "{origin}");
+    let (small, origin) = partitions(&["env.map=8m"]);
+    assert_eq!(small, PartitionChoice::All);
+    assert!(origin.starts_with("preset paper:"), "{origin}");
+    for asked in [PartitionChoice::All, PartitionChoice::Sampled(5)] {
+        let setting = format!("policy.partitions={asked}");
+        assert_eq!(partitions(&["env.map=10m_vs_11m", &setting]).0, asked);
+    }
+}

@@ -1,0 +1,135 @@
+//! What is kept of a finished run when its folder is not: the numbers that figures are made of, in one small file.
+
+use std::path::Path;
+
+use mackrl::config::{Config, ConfigBuilder, ConfigError};
+use serde::{Deserialize, Serialize};
+
+use super::{Measurements, RecordedRun};
+use crate::{bounded, failure::Failure, provenance::Provenance};
+
+/// Longest file that is read, in bytes.
+const LENGTH_MAX: usize = 1 << 26;
+/// Share of battles won in greedy tests.
+const WON: &str = "test_battle_won_mean";
+/// Delegation by the number of commonly known enemies, which follows.
+const DELEGATION: &str = "mackrl/delegation_rate_ck_enemies_";
+
+/// What a run gave.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct TrainingRun {
+    /// Where it comes from; files of early versions do not say.
+    #[serde(default)]
+    provenance: Option<Provenance>,
+    /// The whole configuration, as TOML.
+    config: String,
+    /// Share of battles won at each test: before training, and after each interval.
+    pub(crate) battle_won: Vec<f64>,
+    /// During each interval, the share of chosen pairs that delegated, by the number of enemies they commonly knew; `None`
+    /// where that did not occur.
+    pub(crate) delegation: Vec<Vec<Option<f64>>>,
+}
+
+impl TrainingRun {
+    /// Where these runs come from, repetitions of one experiment taken together.
+    pub(crate) fn provenance_of(runs: &[Self]) -> Vec<Provenance> {
+        Provenance::merged(runs.iter().map(Self::provenance))
+    }
+
+    /// Where it comes from.
+    pub(crate) fn provenance(&self) -> &Provenance {
+        let provenance = self.provenance.as_ref();
+        provenance.expect("a run has a provenance when it was made, and when it was loaded")
+    }
+
+    /// Reads the file at `path`.
+    ///
+    /// # Errors
+    /// If it cannot be read, or holds something else.
+    pub(crate) fn load(path: &Path) -> anyhow::Result<Self> {
+        let bytes = bounded::read(path, LENGTH_MAX)?;
+        let bad = |reason: String| Failure::BadData {
+            message: format!("{} holds no training run: {reason}", path.display()),
+        };
+        let mut run: Self =
+            serde_json::from_slice(&bytes).map_err(|error| bad(error.to_string()))?;
+        let config = run.config().map_err(|error| bad(error.to_string()))?;
+        (run.provenance).get_or_insert_with(|| Provenance::of_unknown_code(&config));
+        Ok(run)
+    }
+
+    /// Everything that determines its result.
+    ///
+    /// # Errors
+    /// If this program does not understand it.
+    pub(crate) fn config(&self) -> Result<Config, ConfigError> {
+        ConfigBuilder::new().file("config", &self.config)?.build()
+    }
+
+    /// One of the metrics that are kept, at the environment steps at which tests were due; seconds are not kept.
+    pub(super) fn measurements(&self, metric: &str, config: &Config) -> Option<Measurements> {
+        let rate_at = metric
+            .strip_prefix(DELEGATION)
+            .and_then(|count| count.parse().ok());
+        let value = |test: usize| match (metric, rate_at) {
+            (WON, _) => Some(self.battle_won[test]),
+            (_, Some(enemies)) => *self.delegation.get(test)?.get::<usize>(enemies)?,
+            _ => None,
+        };
+        let mut found = Measurements::default();
+        for test in 0..self.battle_won.len() {
+            if let Some(value) = value(test) {
+                let due = test as u64 * config.test.interval_steps_env;
+                found.steps.push(due.min(config.run.steps_env) as f64);
+                found.wall_s.push(0.0);
+                found.values.push(value);
+            }
+        }
+        (!found.values.is_empty()).then_some(found)
+    }
+
+    /// Reads what the figures need from the folder of a finished run.
+    pub(crate) fn of_folder(folder: &Path) -> anyhow::Result<Self> {
+        let run = RecordedRun::open(folder.to_owned())?;
+        let won = Measurements::read(&run, WON)?;
+        let mut delegation = vec![Vec::new(); won.values.len()];
+        let world = run.config.env.make()?;
+        let enemies = world.spec().entities - world.spec().agents;
+        for enemies in 0..=enemies {
+            let metric = format!("{DELEGATION}{enemies}");
+            let rates = match Measurements::read(&run, &metric) {
+                Ok(rates) => rates,
+                Err(error) if Failure::is_missing_metric(&error) => continue,
+                Err(error) => return Err(error),
+            };
+            for (&step, &rate) in rates.steps.iter().zip(&rates.values) {
+                // Rows of tests are those that count; a test after the last batch may stand at the step of another row.
+                let Some(test) = won.steps.iter().rposition(|&test| test == step) else {
+                    continue;
+                };
+                delegation[test].resize(enemies, None);
+                delegation[test].push(Some(rate));
+            }
+        }
+        Ok(Self {
+            provenance: run.provenance.into_iter().next_back(),
+            config: run.config.to_toml(),
+            battle_won: won.values,
+            delegation,
+        })
+    }
+}
+
+#[cfg(test)]
+impl TrainingRun {
+    /// A run of the built-in configuration that won so often at its tests.
+    pub(crate) fn of_wins(battle_won: &[f64]) -> Self {
+        let config = Config::default();
+        Self {
+            provenance: Some(Provenance::of_run(&config)),
+            config: config.to_toml(),
+            battle_won: battle_won.to_vec(),
+            delegation: Vec::new(),
+        }
+    }
+}

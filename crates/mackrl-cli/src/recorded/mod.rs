@@ -1,0 +1,94 @@
+//! Runs that were made earlier, as plots and reports need them: found below some folders, read, grouped into series.
+//!
+//! A run is its configuration and its curves; weights and checkpoints are left alone. Two kinds of record are read: run folders,
+//! and the compact files that `mackrl reproduce` keeps of finished runs. Grouping is strict: runs count as repetitions of one
+//! experiment only if nothing but their seeds differs, and are drawn together only if nothing but the algorithm (and what one
+//! asked to compare) differs as well. Whoever wants to compare apples with pears says `--mix`.
+
+mod curve;
+mod find;
+mod grid;
+mod kept;
+mod series;
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use mackrl::config::Config;
+
+use crate::{
+    provenance::Provenance,
+    run_folder::{self, Status},
+};
+pub(crate) use curve::{Axis, Measurements, final_mean, share_of};
+pub(crate) use find::find;
+pub(crate) use grid::Gridded;
+pub(crate) use kept::TrainingRun;
+pub(crate) use series::{Grouping, Selection, Series, group};
+
+/// Folder of the files that are kept of the runs of a figure, below the figure's.
+pub(crate) const KEPT: &str = "runs";
+/// Folder of the run folders of a figure, below the figure's.
+pub(crate) const TRAINING: &str = "training";
+
+/// A run that was made earlier, or is being made.
+#[derive(Debug, Clone)]
+pub(crate) struct RecordedRun {
+    /// Its folder, or its compact file.
+    pub(crate) path: PathBuf,
+    /// Everything that determines its result.
+    pub(crate) config: Config,
+    /// Its curves, if they are kept in a file and not in a folder.
+    pub(crate) kept: Option<TrainingRun>,
+    /// How far it has come.
+    pub(crate) status: Status,
+    /// Where its results come from: one entry for each version of the program that went on with it.
+    pub(crate) provenance: Vec<Provenance>,
+}
+
+impl RecordedRun {
+    /// Reads what is known about the run in a folder.
+    ///
+    /// # Errors
+    /// If the folder holds no run, or one with a configuration that this program does not understand.
+    pub(crate) fn open(path: PathBuf) -> anyhow::Result<Self> {
+        let (config, description) = run_folder::read_description(&path)
+            .with_context(|| format!("cannot use {}", path.display()))?;
+        Ok(Self {
+            path,
+            config,
+            kept: None,
+            status: description.status,
+            provenance: description.provenance,
+        })
+    }
+
+    /// Reads the run that is kept in a file.
+    ///
+    /// # Errors
+    /// If the file holds no such run.
+    pub(crate) fn open_kept(path: PathBuf) -> anyhow::Result<Self> {
+        let run = TrainingRun::load(&path)?;
+        Ok(Self {
+            config: run.config()?,
+            status: Status::Finished,
+            provenance: vec![run.provenance().clone()],
+            kept: Some(run),
+            path,
+        })
+    }
+
+    /// Name of what learns, as configurations have it.
+    pub(crate) fn algorithm(&self) -> String {
+        setting(&self.config, "policy.algorithm")
+    }
+}
+
+/// The value at a key, as it is typed.
+pub(crate) fn setting(config: &Config, key: &str) -> String {
+    match config.get(key) {
+        Some(toml::Value::String(text)) => text,
+        Some(value) => value.to_string(),
+        None => String::new(),
+    }
+}

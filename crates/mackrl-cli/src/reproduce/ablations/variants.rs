@@ -1,0 +1,115 @@
+//! What is taken away from MACKRL, or put in its place, one thing at a time.
+
+use mackrl::config::{CommonKnowledgeFeatures, Config};
+
+/// A learner of the ablation study.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Variant {
+    /// In names of files.
+    pub(super) name: &'static str,
+    /// In the legend.
+    pub(super) label: &'static str,
+    /// What is laid over the preset.
+    pub(super) settings: &'static [&'static str],
+    /// What the comparison with MACKRL tells.
+    pub(super) question: &'static str,
+}
+
+/// MACKRL itself, which all others are compared with.
+pub(super) const MACKRL: Variant = Variant {
+    name: "mackrl",
+    label: "MACKRL",
+    settings: &[],
+    question: "what everything is compared with",
+};
+
+const OTHERS: [Variant; 7] = [
+    Variant {
+        name: "central-v",
+        label: "Central-V",
+        settings: &["policy.algorithm=central-v"],
+        question: "what the hierarchy adds to independent agents with a central critic",
+    },
+    Variant {
+        name: "always-delegate",
+        label: "always delegate",
+        settings: &["policy.delegation=always"],
+        question: "whether the gain comes from acting jointly: without it, this is Central-V",
+    },
+    Variant {
+        name: "never-delegate",
+        label: "never delegate",
+        settings: &["policy.delegation=never"],
+        question: "whether pairs have to learn when not to act jointly",
+    },
+    Variant {
+        name: "one-partition",
+        label: "one partition",
+        settings: &["policy.partitions=sampled:1"],
+        question: "whether it matters who acts with whom",
+    },
+    Variant {
+        name: "five-partitions",
+        label: "5 partitions",
+        settings: &["policy.partitions=sampled:5"],
+        question: "how many partitions are needed",
+    },
+    Variant {
+        name: "uniform-selector",
+        label: "uniform selector",
+        settings: &["policy.selector=uniform"],
+        question: "whether the choice of the partition has to be learned",
+    },
+    Variant {
+        name: "state-only-critic",
+        label: "critic without last actions",
+        settings: &["env.state_last_action=false"],
+        question: "whether the critic has to know what was done last",
+    },
+];
+
+const THIN: Variant = Variant {
+    name: "thin-features",
+    label: "thin features",
+    settings: &["policy.common_knowledge=thin"],
+    question: "what health, shield and unit type in the common knowledge are worth",
+};
+const COMPLETE: Variant = Variant {
+    name: "complete-features",
+    label: "complete features",
+    settings: &["policy.common_knowledge=complete"],
+    question: "what health, shield and unit type in the common knowledge are worth",
+};
+
+/// All learners for a preset: MACKRL first, and the kind of features that the preset does not have last.
+pub(super) fn variants(preset: &Config) -> Vec<Variant> {
+    let features = match preset.policy.common_knowledge {
+        CommonKnowledgeFeatures::Thin => COMPLETE,
+        _ => THIN,
+    };
+    [&[MACKRL], &OTHERS[..], &[features]].concat()
+}
+
+#[cfg(test)]
+mod tests {
+    use mackrl::config::{ConfigBuilder, presets};
+
+    use super::*;
+
+    #[test]
+    fn every_variant_differs_from_the_preset_in_what_it_says_and_in_nothing_else() {
+        for preset in presets() {
+            let base = ConfigBuilder::new().preset(preset.name).unwrap();
+            let config = base.build().unwrap();
+            for variant in variants(&config).into_iter().skip(1) {
+                let changed = (variant.settings.iter())
+                    .try_fold(base.clone(), |builder, setting| builder.set(setting))
+                    .unwrap();
+                let changed = changed.build().unwrap();
+                let differing = Config::keys().into_iter();
+                let differing = differing.filter(|key| changed.get(key) != config.get(key));
+                assert_eq!(differing.count(), 1, "{} of {}", variant.name, preset.name);
+            }
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! The report as one HTML page that needs no other file.
+
+use super::Claim;
+use crate::{plot::LineChart, provenance::CODE, reproduce::ClaimSource};
+
+const STYLE: &str = include_str!("page.css");
+
+/// One part of the page.
+pub(super) struct Section<'a> {
+    pub(super) title: &'static str,
+    pub(super) charts: Vec<LineChart>,
+    pub(super) claims: &'a [Claim],
+    /// What the command prints: our numbers beside the published ones.
+    pub(super) text: String,
+    /// Where the numbers come from, as JSON.
+    pub(super) provenance: String,
+}
+
+/// The whole page.
+pub(super) fn html(command: &str, claims: &[(&str, &Claim)], sections: &[Section<'_>]) -> String {
+    let held = claims.iter().filter(|(_, claim)| claim.holds).count();
+    let mut body = format!(
+        "<h1>MACKRL, reproduced</h1>\n\
+         <p>Multi-Agent Common Knowledge Reinforcement Learning (Foerster, Schroeder de Witt and others, 2018) in a simulation of \
+         StarCraft micromanagement. Every number on this page comes from <code>{}</code>, version {}. Of {} claims, {held} hold in \
+         these runs and {} do not.</p>\n",
+        escaped(command),
+        escaped(CODE),
+        claims.len(),
+        claims.len() - held,
+    );
+    body +=
+        "<table><thead><tr><th>figure</th><th>claim</th><th>verdict</th></tr></thead>\n<tbody>\n";
+    for (figure, claim) in claims {
+        body += &format!(
+            "<tr><td>{figure}</td><td>{}</td><td>{}</td></tr>\n",
+            escaped(&claim.claim),
+            badge(claim)
+        );
+    }
+    body += "</tbody></table>\n";
+    for (number, section) in sections.iter().enumerate() {
+        body += &section.html(number);
+    }
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <title>MACKRL, reproduced</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n"
+    )
+}
+
+impl Section<'_> {
+    fn html(&self, number: usize) -> String {
+        let mut html = format!(
+            "<section>\n<h2>{}</h2>\n<div class=\"charts\">\n",
+            self.title
+        );
+        for (place, chart) in self.charts.iter().enumerate() {
+            // Names inside a drawing are names of the whole page.
+            let unique = format!("plot-area-{number}-{place}");
+            html += &chart.to_svg().replace("plot-area", &unique);
+        }
+        html += "</div>\n";
+        for claim in self.claims {
+            let source = match claim.source {
+                ClaimSource::Paper => "the paper says",
+                ClaimSource::Reproduction => "we say",
+            };
+            html += &format!(
+                "<div class=\"claim\">{} <span class=\"source\">{source}</span> {}<p>{}</p></div>\n",
+                badge(claim),
+                escaped(&claim.claim),
+                escaped(&claim.evidence)
+            );
+        }
+        for (summary, text) in [
+            ("Numbers, published ones beside ours", &self.text),
+            ("Where they come from", &self.provenance),
+        ] {
+            html += &format!(
+                "<details><summary>{summary}</summary><pre>{}</pre></details>\n",
+                escaped(text)
+            );
+        }
+        html + "</section>\n"
+    }
+}
+
+fn badge(claim: &Claim) -> &'static str {
+    if claim.holds {
+        "<b class=\"holds\">holds</b>"
+    } else {
+        "<b class=\"fails\">does not hold</b>"
+    }
+}
+
+/// Text that stays text wherever it stands in a page.
+fn escaped(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for character in text.chars() {
+        match character {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            other => escaped.push(other),
+        }
+    }
+    escaped
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plot::{Axis, Corner};
+
+    fn chart() -> LineChart {
+        let axis = || Axis {
+            label: "x".into(),
+            range: Some([0.0, 1.0]),
+        };
+        LineChart {
+            title: "Chart".into(),
+            subtitle: String::new(),
+            x_axis: axis(),
+            y_axis: axis(),
+            series: Vec::new(),
+            legend: Corner::LowerRight,
+        }
+    }
+
+    #[test]
+    fn the_page_holds_everything_and_asks_for_nothing_else() {
+        let claim = |holds| Claim {
+            claim: "a < b".into(),
+            source: ClaimSource::Paper,
+            holds,
+            evidence: "\"1\" & 2".into(),
+        };
+        let claims = [claim(true), claim(false)];
+        let section = Section {
+            title: "Figure 0",
+            charts: vec![chart(), chart()],
+            claims: &claims,
+            text: "numbers".into(),
+            provenance: "{}".into(),
+        };
+        let listed = [("Figure 0", &claims[0]), ("Figure 0", &claims[1])];
+        let html = html("mackrl reproduce all", &listed, &[section]);
+        assert_eq!(html.matches("<svg ").count(), 2);
+        for place in ["plot-area-0-0", "plot-area-0-1"] {
+            assert_eq!(
+                html.matches(&format!("id=\"{place}\"")).count(),
+                1,
+                "{place}"
+            );
+            assert!(html.contains(&format!("url(#{place})")), "{place}");
+        }
+        assert!(
+            html.contains("a &lt; b") && html.contains("&quot;1&quot; &amp; 2"),
+            "{html}"
+        );
+        assert!(
+            html.contains("1 hold in") && html.contains("and 1 do not"),
+            "{html}"
+        );
+        for outside in ["src=", "href=", "@import", "<script"] {
+            assert!(!html.contains(outside), "{outside}");
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! Many runs: which there are, how each stands, and how they are made side by side.
+//!
+//! Every run has a process and a run folder of its own, with checkpoints like any other, so that nothing is lost when one of them,
+//! the sweep or the machine stops, and so that a batch system can make single runs elsewhere. What is done is not a
+//! separate ledger but the run folders themselves. The figures of the paper make their runs in the same way.
+
+mod display;
+mod engine;
+mod plan;
+
+use std::path::PathBuf;
+
+use mackrl::config::Config;
+use serde::Serialize;
+
+use crate::{
+    failure::Failure,
+    run_folder::{self, LatestRow, RunFolder, Status},
+};
+pub(crate) use engine::{Outcome, make_all};
+pub(crate) use plan::Plan;
+
+/// One run of a sweep.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Entry {
+    /// Says what is different about it; the name of its folder.
+    pub(crate) name: String,
+    /// Its run folder.
+    pub(crate) folder: PathBuf,
+    /// Everything that determines its result.
+    pub(crate) config: Config,
+}
+
+/// How a run stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum State {
+    /// Not begun.
+    Waiting,
+    /// Begun and not finished, and no process makes it now.
+    Stopped,
+    /// A process makes it now.
+    Running,
+    /// At its end.
+    Finished,
+    /// Stopped by an error.
+    Failed,
+}
+
+impl State {
+    /// As it is printed.
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Waiting => "waiting",
+            Self::Stopped => "stopped",
+            Self::Running => "running",
+            Self::Finished => "finished",
+            Self::Failed => "failed",
+        }
+    }
+}
+
+impl Entry {
+    /// How the run stands.
+    ///
+    /// # Errors
+    /// [`Failure::OtherConfiguration`] if the folder holds a run with another configuration.
+    pub(crate) fn state(&self) -> anyhow::Result<State> {
+        if !run_folder::is_run(&self.folder) {
+            RunFolder::check_free(&self.folder)?;
+            return Ok(State::Waiting);
+        }
+        let (config, description) = run_folder::read_description(&self.folder)?;
+        if let Some(key) = self.first_difference(&config) {
+            let folder = self.folder.clone();
+            return Err(Failure::OtherConfiguration { folder, key }.into());
+        }
+        Ok(match description.status {
+            Status::Finished => State::Finished,
+            _ if RunFolder::is_in_use(&self.folder) => State::Running,
+            Status::Failed => State::Failed,
+            Status::Running | Status::Interrupted => State::Stopped,
+        })
+    }
+
+    /// The first setting in which the run that is there differs from this one.
+    fn first_difference(&self, there: &Config) -> Option<String> {
+        let keys = Config::keys().into_iter();
+        let mut differing = keys.filter(|key| self.config.get(key) != there.get(key));
+        differing.next()
+    }
+
+    /// Makes the folder ready for a process that goes on with the run in it.
+    ///
+    /// # Errors
+    /// If the folder cannot be made.
+    pub(crate) fn prepare(&self) -> anyhow::Result<()> {
+        if run_folder::is_run(&self.folder) {
+            return Ok(());
+        }
+        RunFolder::prepare(&self.folder, &self.config, 1)
+    }
+
+    /// What the run last wrote down.
+    pub(crate) fn latest(&self) -> LatestRow {
+        run_folder::latest_row(&self.folder)
+    }
+}
