@@ -30,6 +30,15 @@ pub(crate) enum Failure {
     NotARun { folder: PathBuf },
     /// Stored data that cannot be used.
     BadData { message: String },
+    /// A folder in which no dump lies.
+    NotADump { folder: PathBuf },
+    /// An update with a number that is not finite, of which nothing was kept but, if it could be written, a dump.
+    UpdateRefused {
+        message: String,
+        dump: Option<PathBuf>,
+    },
+    /// A dump whose update does not go wrong as it did.
+    NotReproduced { message: String },
     /// A result of another version of this program, among which results of this one were to stand.
     OtherCode { path: PathBuf, code: String },
     /// A team that does not run decentralised.
@@ -73,7 +82,16 @@ impl fmt::Display for Failure {
                 "{} was made by code {code}, expected {CODE}",
                 path.display()
             ),
-            Self::BadData { message }
+            Self::NotADump { folder } => write!(
+                formatter,
+                "{} is no dump and holds none: it has neither failure.json nor dumps/",
+                folder.display()
+            ),
+            Self::UpdateRefused { message, .. } => {
+                write!(formatter, "the run cannot go on: {message}")
+            }
+            Self::NotReproduced { message }
+            | Self::BadData { message }
             | Self::Usage { message }
             | Self::ReplayDiffers { message } => formatter.write_str(message),
             Self::CertificateFailed { mismatches } => write!(
@@ -96,7 +114,7 @@ impl Failure {
 /// Why the program ends, by the number that the shell sees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Exit {
-    CertificateFailed = 1,
+    Differs = 1,
     Usage = 2,
     Configuration = 64,
     Data = 65,
@@ -138,11 +156,14 @@ fn exit_of(cause: &(dyn std::error::Error + 'static)) -> Option<Exit> {
             | Failure::UnfinishedRun { .. }
             | Failure::FolderLocked { .. }
             | Failure::NotARun { .. }
+            | Failure::NotADump { .. }
             | Failure::OtherCode { .. }
             | Failure::Usage { .. } => Exit::Usage,
             Failure::Interrupted { .. } => Exit::Interrupted,
-            Failure::BadData { .. } | Failure::ReplayDiffers { .. } => Exit::Data,
-            Failure::CertificateFailed { .. } => Exit::CertificateFailed,
+            Failure::BadData { .. }
+            | Failure::UpdateRefused { .. }
+            | Failure::ReplayDiffers { .. } => Exit::Data,
+            Failure::CertificateFailed { .. } | Failure::NotReproduced { .. } => Exit::Differs,
         });
     }
     if let Some(error) = cause.downcast_ref::<mackrl::Error>() {
@@ -179,6 +200,16 @@ fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
                 "give the folder that `mackrl train` wrote, such as runs/3m-mackrl-seed1"
                     .to_owned(),
             ),
+            Failure::NotADump { .. } => Some(
+                "give the folder that `mackrl train` named when it stopped, such as runs/3m-mackrl-seed1/dumps/update-41"
+                    .to_owned(),
+            ),
+            Failure::UpdateRefused {
+                dump: Some(dump), ..
+            } => Some(format!(
+                "`mackrl debug {}` repeats the update and shows where the number comes from",
+                dump.display()
+            )),
             Failure::OtherCode { .. } => Some(
                 "take such results as they are with --any-code, or choose another folder with --out"
                     .to_owned(),
@@ -246,7 +277,7 @@ mod tests {
             (Failure::NotARun { folder }.into(), Exit::Usage),
             (
                 Failure::CertificateFailed { mismatches: 1 }.into(),
-                Exit::CertificateFailed,
+                Exit::Differs,
             ),
             (anyhow::anyhow!("?"), Exit::Defect),
         ];

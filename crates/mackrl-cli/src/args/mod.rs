@@ -2,6 +2,7 @@
 
 mod bench;
 mod configuration;
+mod inquiry;
 mod play;
 mod runs;
 
@@ -17,6 +18,7 @@ pub(crate) use bench::{
     BenchArgs, BenchCommand, BenchEnvironmentArgs, BenchTrainArgs, BenchUpdateArgs,
 };
 pub(crate) use configuration::{ConfigurationArgs, read_scenario, with_scenario};
+pub(crate) use inquiry::DebugArgs;
 pub(crate) use play::PlayArgs;
 pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, TrainArgs};
 
@@ -25,7 +27,8 @@ pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, T
 /// Multi-Agent Common Knowledge Reinforcement Learning (MACKRL), with a built-in StarCraft micromanagement simulator: no
 /// StarCraft, no Python and no GPU are needed.
 ///
-/// Results go to stdout, everything else to stderr. Exit codes: 0 success, 1 a failed certificate, 2 usage, 64 a bad
+/// Results go to stdout, everything else to stderr. Exit codes: 0 success, 1 a failed certificate or a
+/// difference, 2 usage, 64 a bad
 /// configuration, 65 bad data, 70 a defect of this program, 74 input or output, 75 stopped by a signal: go on with `mackrl resume`.
 #[derive(Debug, Parser)]
 #[command(name = "mackrl", version = CODE, max_term_width = 100)]
@@ -45,6 +48,7 @@ pub(crate) enum Command {
     Reproduce(ReproduceArgs),
     Play(PlayArgs),
     Maps(MapsArgs),
+    Debug(DebugArgs),
     Config(ConfigArgs),
     Bench(BenchArgs),
 }

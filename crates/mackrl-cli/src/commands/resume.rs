@@ -6,6 +6,7 @@ use mackrl::training::Trainer;
 
 use crate::{
     args::ResumeArgs,
+    provenance::CODE,
     run_folder::{Resumption, RunFolder},
     signals::StopRequest,
     training_loop::{self, Reporting},
@@ -26,10 +27,17 @@ pub(crate) fn run(args: &ResumeArgs) -> anyhow::Result<()> {
         config,
         checkpoint,
         damaged,
+        earlier_code,
     } = RunFolder::resume(&args.run, threads)?;
     for damage in damaged {
         // The run continues from an earlier checkpoint, whether anybody reads this or not.
         let _ = writeln!(io::stderr(), "warning: {damage}; an earlier one is used");
+    }
+    if let Some(code) = earlier_code {
+        let _ = writeln!(
+            io::stderr(),
+            "warning: the run was made by code {code} and goes on with {CODE}: it may not be what either of them makes alone"
+        );
     }
     let mut trainer = Trainer::new(&config, threads)?;
     if let Some(checkpoint) = checkpoint {
