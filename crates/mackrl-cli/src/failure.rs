@@ -39,6 +39,11 @@ pub(crate) enum Failure {
     },
     /// A dump whose update does not go wrong as it did.
     NotReproduced { message: String },
+    /// Two things that were compared are not the same.
+    Different {
+        /// The first difference, in words.
+        first: String,
+    },
     /// A result of another version of this program, among which results of this one were to stand.
     OtherCode { path: PathBuf, code: String },
     /// A team that does not run decentralised.
@@ -90,6 +95,7 @@ impl fmt::Display for Failure {
             Self::UpdateRefused { message, .. } => {
                 write!(formatter, "the run cannot go on: {message}")
             }
+            Self::Different { first } => write!(formatter, "they differ, first in {first}"),
             Self::NotReproduced { message }
             | Self::BadData { message }
             | Self::Usage { message }
@@ -163,7 +169,9 @@ fn exit_of(cause: &(dyn std::error::Error + 'static)) -> Option<Exit> {
             Failure::BadData { .. }
             | Failure::UpdateRefused { .. }
             | Failure::ReplayDiffers { .. } => Exit::Data,
-            Failure::CertificateFailed { .. } | Failure::NotReproduced { .. } => Exit::Differs,
+            Failure::CertificateFailed { .. }
+            | Failure::Different { .. }
+            | Failure::NotReproduced { .. } => Exit::Differs,
         });
     }
     if let Some(error) = cause.downcast_ref::<mackrl::Error>() {

@@ -34,6 +34,7 @@ fn main() -> ExitCode {
         Command::Reproduce(args) => commands::reproduce::run(&args),
         Command::Play(args) => commands::play::run(&args),
         Command::Maps(args) => commands::maps::run(&args),
+        Command::Diff(args) => commands::diff::run(&args),
         Command::Debug(args) => commands::debug::run(&args),
         Command::Config(args) => commands::config::run(&args),
         Command::Bench(args) => commands::bench::run(&args),

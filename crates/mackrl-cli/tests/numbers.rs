@@ -103,7 +103,10 @@ fn a_dump_that_does_not_fail_is_told_apart_from_a_damaged_one_and_from_none() {
     // The configuration under which the update goes well, with a manifest that vouches for it.
     let config = dump.join("config.toml");
     let text = fs::read_to_string(&config).expect("a configuration");
-    let sound = text.replace("gradient_norm_max = 1000000000000000000000000000000.0", "gradient_norm_max = 10.0");
+    let sound = text.replace(
+        "gradient_norm_max = 1000000000000000000000000000000.0",
+        "gradient_norm_max = 10.0",
+    );
     assert_ne!(sound, text);
     fs::write(&config, &sound).expect("a dump can be changed");
     let output = mackrl(&["debug", &dump.to_string_lossy()]).output();

@@ -18,7 +18,7 @@ pub(crate) use bench::{
     BenchArgs, BenchCommand, BenchEnvironmentArgs, BenchTrainArgs, BenchUpdateArgs,
 };
 pub(crate) use configuration::{ConfigurationArgs, read_scenario, with_scenario};
-pub(crate) use inquiry::DebugArgs;
+pub(crate) use inquiry::{DebugArgs, DiffArgs};
 pub(crate) use play::PlayArgs;
 pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, TrainArgs};
 
@@ -48,6 +48,7 @@ pub(crate) enum Command {
     Reproduce(ReproduceArgs),
     Play(PlayArgs),
     Maps(MapsArgs),
+    Diff(DiffArgs),
     Debug(DebugArgs),
     Config(ConfigArgs),
     Bench(BenchArgs),

@@ -18,6 +18,7 @@ mod checkpoints;
 mod disk;
 mod dumps;
 mod manifest;
+mod recorded;
 mod run;
 
 use std::{
@@ -38,6 +39,7 @@ use checkpoints::Surroundings;
 use disk::{Disk, RealDisk, cannot, cannot_write};
 pub(crate) use dumps::{Dump, Refusal};
 use manifest::{Fingerprint, Growing};
+pub(crate) use recorded::{Recorded, Row, timeless};
 pub(crate) use run::Run;
 
 const CONFIG: &str = "config.toml";

@@ -46,7 +46,13 @@ pub(crate) fn mackrl(words: &[&str]) -> Command {
 
 /// The command that begins the small run in `folder`, with further settings.
 pub(crate) fn train(folder: &Path, settings: &[&str]) -> Command {
-    let mut command = mackrl(&["train", "--map", "3m", "--threads", "1", "--out"]);
+    train_on(1, folder, settings)
+}
+
+/// As [`train`], on some threads.
+pub(crate) fn train_on(threads: usize, folder: &Path, settings: &[&str]) -> Command {
+    let threads = threads.to_string();
+    let mut command = mackrl(&["train", "--map", "3m", "--threads", &threads, "--out"]);
     command.arg(folder);
     for setting in SMALL.iter().chain(settings) {
         command.args(["--set", setting]);
