@@ -5,14 +5,13 @@ mod support;
 use std::{fs, path::Path};
 
 use serde_json::Value;
-use support::{checkpoints, exits, mackrl, train};
+use support::{checkpoints, exits, mackrl, train_on};
 
 /// A short run, in a folder of this name, with further settings.
-fn run(parent: &Path, name: &str, threads: &str, settings: &[&str]) -> String {
+fn run(parent: &Path, name: &str, threads: usize, settings: &[&str]) -> String {
     let path = parent.join(name);
-    let mut command = train(&path, settings);
+    let mut command = train_on(threads, &path, settings);
     command.args(["--set", "run.steps_env=600"]);
-    command.env("MACKRL_TEST_THREADS", threads);
     exits(command, 0);
     path.to_string_lossy().into_owned()
 }
@@ -39,25 +38,15 @@ fn edit(run: &str, file: &str, from: &str, to: &str) {
 #[test]
 fn equal_runs_are_equal_whatever_their_threads() {
     let parent = tempfile::tempdir().expect("a folder for runs");
-    let one = run(parent.path(), "one", "1", &[]);
-    let other = parent.path().join("other");
-    let mut command = train(&other, &[]);
-    command.args(["--set", "run.steps_env=600"]);
-    let words: Vec<_> = command.get_args().map(ToOwned::to_owned).collect();
-    let words = words.iter().map(|word| word.to_string_lossy().into_owned());
-    // The small run asks for one thread.
-    let words: Vec<String> = words
-        .map(|word| if word == "1" { "3".to_owned() } else { word })
-        .collect();
-    let words: Vec<&str> = words.iter().map(String::as_str).collect();
-    exits(mackrl(&words), 0);
-    let found = diff(&one, &other.to_string_lossy(), 0);
+    let one = run(parent.path(), "one", 1, &[]);
+    let other = run(parent.path(), "other", 3, &[]);
+    let found = diff(&one, &other, 0);
     assert_eq!(
         found["replay"],
         Value::Null,
         "nothing had to be played again"
     );
-    let folders = [&one, &*other.to_string_lossy()].map(|run| checkpoints(Path::new(run)).pop());
+    let folders = [&one, &other].map(|run| checkpoints(Path::new(run)).pop());
     let [a, b] = folders.map(|folder| folder.expect("a checkpoint").to_string_lossy().into_owned());
     diff(&a, &b, 0);
 }
@@ -65,8 +54,8 @@ fn equal_runs_are_equal_whatever_their_threads() {
 #[test]
 fn another_seed_is_named_with_the_first_step_that_it_changes() {
     let parent = tempfile::tempdir().expect("a folder for runs");
-    let one = run(parent.path(), "one", "1", &[]);
-    let other = run(parent.path(), "other", "1", &["run.seed=4"]);
+    let one = run(parent.path(), "one", 1, &[]);
+    let other = run(parent.path(), "other", 1, &["run.seed=4"]);
     let found = diff(&one, &other, 1);
     assert_eq!(found["configuration"][0]["name"], "run.seed");
     assert_eq!(found["configuration"][0]["a"], 3);
@@ -93,8 +82,8 @@ fn another_seed_is_named_with_the_first_step_that_it_changes() {
 #[test]
 fn another_rate_changes_what_is_learnt_before_what_is_played() {
     let parent = tempfile::tempdir().expect("a folder for runs");
-    let one = run(parent.path(), "one", "1", &[]);
-    let other = run(parent.path(), "other", "1", &["learner.learning_rate=0.1"]);
+    let one = run(parent.path(), "one", 1, &[]);
+    let other = run(parent.path(), "other", 1, &["learner.learning_rate=0.1"]);
     let found = diff(&one, &other, 1);
     assert_eq!(found["configuration"][0]["name"], "learner.learning_rate");
     assert_eq!(found["replay"]["learning"]["update"], 0);
@@ -105,14 +94,27 @@ fn another_rate_changes_what_is_learnt_before_what_is_played() {
 #[test]
 fn another_version_and_changed_records_are_told_apart() {
     let parent = tempfile::tempdir().expect("a folder for runs");
-    let one = run(parent.path(), "one", "1", &[]);
-    let other = run(parent.path(), "other", "1", &[]);
+    let one = run(parent.path(), "one", 1, &[]);
+    let other = run(parent.path(), "other", 1, &[]);
     edit(&other, "run.json", "\"code\": \"", "\"code\": \"9.");
     let found = diff(&one, &other, 1);
     assert_eq!(found["code"]["name"], "code");
     assert_eq!(found["metrics"], Value::Null);
+    edit(&other, "run.json", "\"finished\"", "\"interrupted\"");
+    let stderr = exits(mackrl(&["resume", &other]), 0);
+    assert!(
+        stderr.contains("warning: the run was made by code 9."),
+        "{stderr}"
+    );
+    let record = fs::read_to_string(Path::new(&other).join("run.json")).expect("a record");
+    let record: Value = serde_json::from_str(&record).expect("a JSON object");
+    assert_eq!(
+        record["provenance"].as_array().map(Vec::len),
+        Some(2),
+        "both versions"
+    );
 
-    let other = run(parent.path(), "third", "1", &[]);
+    let other = run(parent.path(), "third", 1, &[]);
     let metrics = fs::read_to_string(Path::new(&other).join("metrics.jsonl")).expect("metrics");
     let row = metrics.lines().nth(1).expect("a second row");
     let row: Value = serde_json::from_str(row).expect("a JSON object");
@@ -141,7 +143,7 @@ fn another_version_and_changed_records_are_told_apart() {
 #[test]
 fn results_are_compared_by_where_they_come_from_and_by_value() {
     let parent = tempfile::tempdir().expect("a folder for runs");
-    let one = run(parent.path(), "one", "1", &[]);
+    let one = run(parent.path(), "one", 1, &[]);
     let evaluate = |name: &str, seed: &str| {
         let words = [
             "evaluate",

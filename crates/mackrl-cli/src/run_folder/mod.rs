@@ -194,7 +194,10 @@ impl RunFolder {
             .into());
         }
         let earlier_code = record
-            .and_then(|record| Some(record.provenance.last()?.code.clone()))
+            .map(|record| match record.provenance.last() {
+                Some(provenance) => provenance.code.clone(),
+                None => "of an early version".to_owned(),
+            })
             .filter(|code| code != CODE);
         let (latest, damaged) = checkpoints::latest(path)?;
         let (number, metrics_bytes) = latest.as_ref().map_or((None, 0), |stored| {
