@@ -52,6 +52,12 @@ pub(crate) enum Failure {
     Usage { message: String },
     /// A recorded episode that does not play as it did.
     ReplayDiffers { message: String },
+    /// A replay that another version of this program plays.
+    OtherSimulator {
+        message: String,
+        /// Version of the program that plays it.
+        program: String,
+    },
 }
 
 impl fmt::Display for Failure {
@@ -99,7 +105,8 @@ impl fmt::Display for Failure {
             Self::NotReproduced { message }
             | Self::BadData { message }
             | Self::Usage { message }
-            | Self::ReplayDiffers { message } => formatter.write_str(message),
+            | Self::ReplayDiffers { message }
+            | Self::OtherSimulator { message, .. } => formatter.write_str(message),
             Self::CertificateFailed { mismatches } => write!(
                 formatter,
                 "not decentralised: {mismatches} actions differ from the central run"
@@ -168,7 +175,8 @@ fn exit_of(cause: &(dyn std::error::Error + 'static)) -> Option<Exit> {
             Failure::Interrupted { .. } => Exit::Interrupted,
             Failure::BadData { .. }
             | Failure::UpdateRefused { .. }
-            | Failure::ReplayDiffers { .. } => Exit::Data,
+            | Failure::ReplayDiffers { .. }
+            | Failure::OtherSimulator { .. } => Exit::Data,
             Failure::CertificateFailed { .. }
             | Failure::Different { .. }
             | Failure::NotReproduced { .. } => Exit::Differs,
@@ -223,8 +231,12 @@ fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
                     .to_owned(),
             ),
             Failure::ReplayDiffers { .. } => Some(
-                "a replay plays the same only in the version of mackrl that recorded it".to_owned(),
+                "the file was changed, or its program simulated otherwise: record it again"
+                    .to_owned(),
             ),
+            Failure::OtherSimulator { program, .. } => {
+                Some(format!("mackrl {program}, which recorded it, plays it"))
+            }
             _ => None,
         };
     }

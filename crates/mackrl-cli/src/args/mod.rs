@@ -4,6 +4,7 @@ mod bench;
 mod configuration;
 mod inquiry;
 mod play;
+mod replay;
 mod runs;
 
 use std::path::PathBuf;
@@ -20,6 +21,7 @@ pub(crate) use bench::{
 pub(crate) use configuration::{ConfigurationArgs, read_scenario, with_scenario};
 pub(crate) use inquiry::{DebugArgs, DiffArgs};
 pub(crate) use play::PlayArgs;
+pub(crate) use replay::{ExplainArgs, ReplayArgs};
 pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, TrainArgs};
 
 /// Teaches teams to coordinate without communicating, by acting jointly on what they commonly know.
@@ -47,6 +49,8 @@ pub(crate) enum Command {
     ExecuteAgent(ExecuteAgentArgs),
     Reproduce(ReproduceArgs),
     Play(PlayArgs),
+    Replay(ReplayArgs),
+    Explain(ExplainArgs),
     Maps(MapsArgs),
     Diff(DiffArgs),
     Debug(DebugArgs),

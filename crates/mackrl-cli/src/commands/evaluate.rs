@@ -1,13 +1,22 @@
 //! `mackrl evaluate`: how well a trained team plays.
 
+use std::path::Path;
+
 use anyhow::Context;
-use mackrl::training::{Evaluation, evaluate};
+use mackrl::{
+    policy::Behaviour,
+    replay::record_policy,
+    training::{Evaluation, evaluate},
+};
+use mackrl_env::{EpisodeKey, Stream};
 use serde_json::Value;
 
 use crate::{
     args::EvaluateArgs,
+    failure::Failure,
     output::{self, Sourced},
     provenance::{Choice, Judgement, Provenance},
+    reproduce::Meter,
     run_folder::Run,
 };
 
@@ -17,14 +26,42 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     let seed = args.seed.unwrap_or(run.config.run.seed);
     let episodes = args.episodes.get();
     let threads = args.threads.count();
+    if args.save_replays > episodes {
+        let message = format!(
+            "--save-replays {} of {episodes} episodes, expected at most --episodes",
+            args.save_replays
+        );
+        return Err(Failure::Usage { message }.into());
+    }
     let evaluation = evaluate(&run.config, &run.weights, episodes, seed, threads)
         .with_context(|| format!("cannot evaluate {}", args.run.display()))?;
+    save_replays(&args.run, &run, seed, args.save_replays)?;
     let judgement = Judgement {
         actions: Choice::Greedy,
         episodes,
     };
     let provenance = Provenance::of_weights(&run.config, &run.weights, seed, judgement);
     print(provenance, &evaluation, args.json)
+}
+
+/// Plays the first `count` of the episodes again and keeps them.
+fn save_replays(folder: &Path, run: &Run, seed: u64, count: usize) -> anyhow::Result<()> {
+    if count == 0 {
+        return Ok(());
+    }
+    let replays = folder.join("replays");
+    std::fs::create_dir_all(&replays)
+        .with_context(|| format!("cannot create {}", replays.display()))?;
+    let meter = Meter::new("replays");
+    for episode in 0..count {
+        let key = EpisodeKey::new(seed, Stream::Evaluation, episode as u64);
+        let replay = record_policy(&run.config, &run.weights, Behaviour::GREEDY, key)
+            .with_context(|| format!("cannot make a replay of {}", folder.display()))?;
+        let file = replays.join(format!("seed{seed}-episode{episode}.replay.gz"));
+        output::write_file(&file, &replay.to_bytes())?;
+        meter.report(episode + 1, count);
+    }
+    Ok(())
 }
 
 /// Prints an evaluation: a JSON object of numbers and their provenance, or a table in which each mean stands beside its standard error.

@@ -155,6 +155,9 @@ fn header(line: &[u8]) -> Result<Header, ReplayError> {
     if header.key.episode >= EPISODES_MOST {
         return Err(damaged("key.episode is 2^56 or more, expected less"));
     }
+    if header.env.map.chars().any(char::is_control) {
+        return Err(damaged("env.map has control characters, expected a name"));
+    }
     Ok(header)
 }
 

@@ -26,7 +26,7 @@ impl Names {
             agents: skirmish.spec().agents,
             kinds: recruits
                 .clone()
-                .map(|recruit| profile(recruit.kind).name.clone())
+                .map(|recruit| printable(&profile(recruit.kind).name))
                 .collect(),
             heals: recruits
                 .map(|recruit| profile(recruit.kind).care.is_some())
@@ -73,4 +73,9 @@ impl Names {
             Some(target) => format!("attack e{target}"),
         }
     }
+}
+
+/// A name that somebody wrote, without what would change a terminal or break a document.
+fn printable(name: &str) -> String {
+    name.chars().filter(|c| !c.is_control()).collect()
 }

@@ -155,7 +155,11 @@ impl Playback {
                 spec.actions
             ));
         }
-        if (thought.chosen).is_some_and(|chosen| chosen >= thought.partitions.len()) {
+        let is_chosen = match thought.chosen {
+            Some(chosen) => chosen < thought.partitions.len(),
+            None => thought.partitions.is_empty(),
+        };
+        if !is_chosen {
             return Some("the chosen partition is none of those in force".to_owned());
         }
         let visible_n = &self.moments.last()?.visible_n;
