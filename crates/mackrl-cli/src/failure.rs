@@ -31,6 +31,20 @@ pub(crate) enum Failure {
     NotARun { folder: PathBuf },
     /// Stored data that cannot be used.
     BadData { message: String },
+    /// A folder in which no dump lies.
+    NotADump { folder: PathBuf },
+    /// An update with a number that is not finite, of which nothing was kept but, if it could be written, a dump.
+    UpdateRefused {
+        message: String,
+        dump: Option<PathBuf>,
+    },
+    /// A dump whose update does not go wrong as it did.
+    NotReproduced { message: String },
+    /// Two things that were compared are not the same.
+    Different {
+        /// The first difference, in words.
+        first: String,
+    },
     /// A result of another version of this program, among which results of this one were to stand.
     OtherCode { path: PathBuf, code: String },
     /// StarCraft II is not as it has to be.
@@ -112,7 +126,17 @@ impl fmt::Display for Failure {
                     "interrupted when {finished} of {runs} runs were finished"
                 )
             }
-            Self::BadData { message }
+            Self::NotADump { folder } => write!(
+                formatter,
+                "{} is no dump and holds none: it has neither failure.json nor dumps/",
+                folder.display()
+            ),
+            Self::UpdateRefused { message, .. } => {
+                write!(formatter, "the run cannot go on: {message}")
+            }
+            Self::Different { first } => write!(formatter, "they differ, first in {first}"),
+            Self::NotReproduced { message }
+            | Self::BadData { message }
             | Self::Usage { message }
             | Self::MissingMetric { message }
             | Self::UnlikeRuns { message, .. }
@@ -149,7 +173,7 @@ impl Failure {
 /// Why the program ends, by the number that the shell sees.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Exit {
-    CertificateFailed = 1,
+    Differs = 1,
     Usage = 2,
     Configuration = 64,
     Data = 65,
@@ -191,6 +215,7 @@ fn exit_of(cause: &(dyn std::error::Error + 'static)) -> Option<Exit> {
             | Failure::UnfinishedRun { .. }
             | Failure::FolderLocked { .. }
             | Failure::NotARun { .. }
+            | Failure::NotADump { .. }
             | Failure::OtherCode { .. }
             | Failure::OtherConfiguration { .. }
             | Failure::MissingMetric { .. }
@@ -198,10 +223,13 @@ fn exit_of(cause: &(dyn std::error::Error + 'static)) -> Option<Exit> {
             | Failure::Usage { .. } => Exit::Usage,
             Failure::Interrupted { .. } | Failure::SweepInterrupted { .. } => Exit::Interrupted,
             Failure::BadData { .. }
+            | Failure::UpdateRefused { .. }
             | Failure::ReplayDiffers { .. }
             | Failure::OtherSimulator { .. } => Exit::Data,
-            Failure::CertificateFailed { .. } => Exit::CertificateFailed,
             Failure::NotReady { .. } => Exit::InputOutput,
+            Failure::CertificateFailed { .. }
+            | Failure::Different { .. }
+            | Failure::NotReproduced { .. } => Exit::Differs,
         });
     }
     if let Some(error) = cause.downcast_ref::<mackrl::Error>() {
@@ -244,6 +272,16 @@ fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
             ),
             Failure::SweepInterrupted { .. } => Some("go on with the same command".to_owned()),
             Failure::UnlikeRuns { remedy, .. } => Some(remedy.clone()),
+            Failure::NotADump { .. } => Some(
+                "give the folder that `mackrl train` named when it stopped, such as runs/3m-mackrl-seed1/dumps/update-41"
+                    .to_owned(),
+            ),
+            Failure::UpdateRefused {
+                dump: Some(dump), ..
+            } => Some(format!(
+                "`mackrl debug {}` repeats the update and shows where the number comes from",
+                dump.display()
+            )),
             Failure::OtherCode { .. } => Some(
                 "take such results as they are with --any-code, or choose another folder with --out"
                     .to_owned(),
@@ -318,7 +356,7 @@ mod tests {
             (Failure::NotARun { folder }.into(), Exit::Usage),
             (
                 Failure::CertificateFailed { mismatches: 1 }.into(),
-                Exit::CertificateFailed,
+                Exit::Differs,
             ),
             (anyhow::anyhow!("?"), Exit::Defect),
         ];

@@ -3,6 +3,7 @@
 use std::{path::PathBuf, time::Instant};
 
 use mackrl::{
+    NotFinite,
     config::Config,
     training::{Checkpoint, MetricRow, Trainer},
 };
@@ -13,7 +14,7 @@ use crate::{
     output,
     progress::{Detail, Progress, Standing},
     provenance::Provenance,
-    run_folder::{RunFolder, Status},
+    run_folder::{Refusal, RunFolder, Status},
     signals::StopRequest,
 };
 
@@ -179,7 +180,11 @@ fn train(
             }
             .into());
         }
-        let Update { metrics, standing } = training.update()?;
+        let updated = training.update();
+        let Update { metrics, standing } = updated.map_err(|error| match error {
+            mackrl::Error::NotFinite(number) => refuse(folder, training, config, *number),
+            other => other.into(),
+        })?;
         if let Some(metrics) = metrics {
             folder.append_metrics(&metrics)?;
             progress.hear(&metrics);
@@ -200,6 +205,32 @@ fn train(
         wall_s,
         steps_per_s: (steps_env - steps_env_before) as f64 / wall_s.max(1e-9),
     })
+}
+
+/// Keeps a refused update, of which the trainer has kept nothing, and gives the error that ends the run.
+fn refuse(
+    folder: &mut RunFolder,
+    training: &impl Training,
+    config: &Config,
+    number: NotFinite,
+) -> anyhow::Error {
+    let refusal = Refusal {
+        message: number.to_string(),
+        number,
+        provenance: Provenance::of_run(config),
+    };
+    let message = refusal.message.clone();
+    match folder.write_dump(&refusal, &training.checkpoint()) {
+        Ok(dump) => Failure::UpdateRefused {
+            message,
+            dump: Some(dump),
+        },
+        Err(error) => Failure::UpdateRefused {
+            message: format!("{message}; what it takes to repeat this is lost: {error:#}"),
+            dump: None,
+        },
+    }
+    .into()
 }
 
 /// Prints what a finished run says of itself.

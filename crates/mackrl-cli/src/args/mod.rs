@@ -3,6 +3,7 @@
 mod analysis;
 mod bench;
 mod configuration;
+mod inquiry;
 mod play;
 mod replay;
 mod runs;
@@ -26,6 +27,7 @@ pub(crate) use bench::{
     BenchArgs, BenchCommand, BenchEnvironmentArgs, BenchTrainArgs, BenchUpdateArgs,
 };
 pub(crate) use configuration::{ConfigurationArgs, read_scenario, with_scenario};
+pub(crate) use inquiry::{DebugArgs, DiffArgs};
 pub(crate) use play::{PlayArgs, PolicyChoice};
 pub(crate) use replay::{ExplainArgs, ReplayArgs};
 pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, TrainArgs};
@@ -41,7 +43,8 @@ pub(crate) use sweep::SweepArgs;
 /// Multi-Agent Common Knowledge Reinforcement Learning (MACKRL), with a built-in StarCraft micromanagement simulator: no
 /// StarCraft, no Python and no GPU are needed.
 ///
-/// Results go to stdout, everything else to stderr. Exit codes: 0 success, 1 a failed certificate, 2 usage, 64 a bad
+/// Results go to stdout, everything else to stderr. Exit codes: 0 success, 1 a failed certificate or a
+/// difference, 2 usage, 64 a bad
 /// configuration, 65 bad data, 70 a defect of this program, 74 input or output, 75 stopped by a signal: go on with `mackrl resume`.
 #[derive(Debug, Parser)]
 #[command(name = "mackrl", version = CODE, max_term_width = 100)]
@@ -67,6 +70,8 @@ pub(crate) enum Command {
     Explain(ExplainArgs),
     Serve(ServeRunsArgs),
     Maps(MapsArgs),
+    Diff(DiffArgs),
+    Debug(DebugArgs),
     Config(ConfigArgs),
     Bench(BenchArgs),
     Sc2(Sc2Args),

@@ -11,6 +11,7 @@ use crate::{
     args::ResumeArgs,
     commands::sc2,
     progress::Detail,
+    provenance::CODE,
     run_folder::{Resumption, RunFolder},
     signals::StopRequest,
     training_loop::{self, Reporting, Summary},
@@ -54,10 +55,17 @@ pub(crate) fn go_on(
         config,
         checkpoint,
         damaged,
+        earlier_code,
     } = RunFolder::resume(path, threads)?;
     for damage in damaged {
         // The run continues from an earlier checkpoint, whether anybody reads this or not.
         let _ = writeln!(io::stderr(), "warning: {damage}; an earlier one is used");
+    }
+    if let Some(code) = earlier_code {
+        let _ = writeln!(
+            io::stderr(),
+            "warning: the run was made by code {code} and goes on with {CODE}: it may not be what either of them makes alone"
+        );
     }
     let mut trainer = Trainer::in_world(&config, &sc2::world(&config)?, threads)?;
     if let Some(checkpoint) = checkpoint {

@@ -27,9 +27,9 @@ use super::{
 use crate::{failure::Failure, provenance::CODE};
 
 const CHECKPOINTS: &str = "checkpoints";
-const TENSORS: &str = "tensors.safetensors";
-const COUNTERS: &str = "counters.json";
-const MANIFEST: &str = "manifest.json";
+pub(super) const TENSORS: &str = "tensors.safetensors";
+pub(super) const COUNTERS: &str = "counters.json";
+pub(super) const MANIFEST: &str = "manifest.json";
 /// Digits of a number in the name of its folder: names sort as numbers do.
 const DIGITS: usize = 12;
 
@@ -62,8 +62,8 @@ pub(super) fn write(
 ) -> anyhow::Result<()> {
     let place = place(run, number);
     if !place.exists() {
-        create_parent(disk, run)?;
-        make(disk, &place, checkpoint, surroundings)?;
+        create_parent(disk, &place)?;
+        make(disk, &place, &contents(checkpoint), surroundings)?;
     }
     let numbers = numbers(run)?;
     for &old in &numbers[..numbers.len().saturating_sub(kept)] {
@@ -72,26 +72,32 @@ pub(super) fn write(
     Ok(())
 }
 
-fn create_parent(disk: &dyn Disk, run: &Path) -> anyhow::Result<()> {
-    let parent = run.join(CHECKPOINTS);
+/// Makes the folder that `place` is to lie in, unless it is there.
+pub(super) fn create_parent(disk: &dyn Disk, place: &Path) -> anyhow::Result<()> {
+    let parent = parent(place);
     if parent.exists() {
         return Ok(());
     }
     disk.create_folder(&parent)
         .with_context(|| cannot("create", &parent))?;
-    disk::sync_folder(disk, run)
+    disk::sync_folder(disk, &self::parent(&parent))
 }
 
-fn make(
-    disk: &dyn Disk,
-    place: &Path,
-    checkpoint: &Checkpoint,
-    Surroundings { config, metrics }: Surroundings,
-) -> anyhow::Result<()> {
-    let contents = [
+/// The files of a checkpoint.
+pub(super) fn contents(checkpoint: &Checkpoint) -> [(&'static str, &[u8]); 2] {
+    [
         (TENSORS, &checkpoint.tensors),
         (COUNTERS, &checkpoint.counters),
-    ];
+    ]
+}
+
+/// Makes a folder of these files and their manifest.
+pub(super) fn make(
+    disk: &dyn Disk,
+    place: &Path,
+    contents: &[(&str, &[u8])],
+    Surroundings { config, metrics }: Surroundings,
+) -> anyhow::Result<()> {
     let manifest = Manifest {
         format: FORMAT,
         code: CODE.to_owned(),

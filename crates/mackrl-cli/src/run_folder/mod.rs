@@ -5,6 +5,7 @@
 //! DIR/run.json              command line, provenance, status
 //! DIR/metrics.jsonl         one JSON object a line
 //! DIR/checkpoints/          the latest few, from which the run continues
+//! DIR/dumps/                updates that were refused because of a number that is not finite
 //! DIR/weights.safetensors   the policy and the critic; written at the end
 //! DIR/lock                  held by the process that writes
 //! ```
@@ -15,8 +16,10 @@
 
 mod checkpoints;
 mod disk;
+mod dumps;
 mod latest;
 mod manifest;
+mod recorded;
 mod run;
 
 use std::{
@@ -29,11 +32,16 @@ use anyhow::Context;
 use mackrl::{config::Config, training::Checkpoint};
 use serde::{Deserialize, Serialize};
 
-use crate::{failure::Failure, provenance::Provenance};
+use crate::{
+    failure::Failure,
+    provenance::{CODE, Provenance},
+};
 use checkpoints::Surroundings;
 use disk::{Disk, RealDisk, cannot, cannot_write};
+pub(crate) use dumps::{Dump, Refusal};
 pub(crate) use latest::{LatestRow, latest_row};
 use manifest::{Fingerprint, Growing};
+pub(crate) use recorded::{Recorded, Row, timeless};
 pub(crate) use run::Run;
 
 const CONFIG: &str = "config.toml";
@@ -68,6 +76,20 @@ struct RunRecord {
     /// Threads in use, which change no result.
     threads: usize,
     status: Status,
+    /// Why the run cannot go on, if it cannot.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    refusal: Option<RecordedRefusal>,
+}
+
+/// What `run.json` tells of an update that was refused.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+struct RecordedRefusal {
+    /// Why.
+    message: String,
+    /// The code that refused it; other code may not.
+    code: String,
+    /// Where its dump lies, from the run folder.
+    dump: PathBuf,
 }
 
 /// The folder of a run that is being made.
@@ -93,6 +115,8 @@ pub(crate) struct Resumption {
     pub(crate) checkpoint: Option<Checkpoint>,
     /// Later checkpoints that could not be used, and why.
     pub(crate) damaged: Vec<String>,
+    /// The code that made the run so far, if it is not that of this program.
+    pub(crate) earlier_code: Option<String>,
 }
 
 impl RunFolder {
@@ -170,11 +194,27 @@ impl RunFolder {
     /// again.
     ///
     /// # Errors
-    /// [`Failure::NotARun`], [`Failure::FolderLocked`] if another process writes there, [`Failure::BadData`] if no checkpoint can
-    /// be used; otherwise the path that could not be read or written.
+    /// [`Failure::NotARun`], [`Failure::FolderLocked`] if another process writes there, [`Failure::UpdateRefused`] if the run
+    /// stopped at an update that this program would refuse again, [`Failure::BadData`] if no checkpoint can be used; otherwise the path that could not be read or written.
     pub(crate) fn resume(path: &Path, threads: usize) -> anyhow::Result<Resumption> {
         let config = run::read_config(path)?;
         let lock = lock(path)?;
+        let record = read_record(path);
+        if let Some(refusal) = record.as_ref().and_then(|record| record.refusal.clone())
+            && refusal.code == CODE
+        {
+            return Err(Failure::UpdateRefused {
+                message: refusal.message,
+                dump: Some(path.join(refusal.dump)),
+            }
+            .into());
+        }
+        let earlier_code = record
+            .map(|record| match record.provenance.last() {
+                Some(provenance) => provenance.code.clone(),
+                None => "of an early version".to_owned(),
+            })
+            .filter(|code| code != CODE);
         let (latest, damaged) = checkpoints::latest(path)?;
         let (number, metrics_bytes) = latest.as_ref().map_or((None, 0), |stored| {
             (Some(stored.number), stored.metrics_bytes)
@@ -185,6 +225,7 @@ impl RunFolder {
             config,
             checkpoint: latest.map(|stored| stored.checkpoint),
             damaged,
+            earlier_code,
         })
     }
 
@@ -204,8 +245,10 @@ impl RunFolder {
             provenance: Vec::new(),
             threads,
             status: Status::Running,
+            refusal: None,
         });
         record.threads = threads;
+        record.refusal = None;
         let provenance = Provenance::of_run(config);
         if !record.provenance.contains(&provenance) {
             record.provenance.push(provenance);
@@ -252,10 +295,7 @@ impl RunFolder {
         self.disk
             .sync(&self.metrics)
             .with_context(|| cannot("sync", &self.path.join(METRICS)))?;
-        let surroundings = Surroundings {
-            config: self.config.clone(),
-            metrics: self.metrics_so_far.fingerprint(),
-        };
+        let surroundings = self.surroundings();
         checkpoints::write(
             &*self.disk,
             &self.path,
@@ -263,6 +303,41 @@ impl RunFolder {
             surroundings,
             self.checkpoints_kept,
         )
+    }
+
+    /// Keeps what the refused update needs to be repeated, and notes in `run.json`, when its status is written next, why the run
+    /// cannot go on; gives the dump's path.
+    ///
+    /// # Errors
+    /// Path, bytes and what the operating system says.
+    pub(crate) fn write_dump(
+        &mut self,
+        refusal: &Refusal,
+        before: &Checkpoint,
+    ) -> anyhow::Result<PathBuf> {
+        let config_path = self.path.join(CONFIG);
+        let config = fs::read(&config_path).with_context(|| cannot("read", &config_path))?;
+        let surroundings = self.surroundings();
+        let dump = dumps::write(
+            &*self.disk,
+            &self.path,
+            (refusal, before),
+            &config,
+            surroundings,
+        )?;
+        self.record.refusal = Some(RecordedRefusal {
+            message: refusal.message.clone(),
+            code: CODE.to_owned(),
+            dump: dump.strip_prefix(&self.path).unwrap_or(&dump).to_owned(),
+        });
+        Ok(dump)
+    }
+
+    fn surroundings(&self) -> Surroundings {
+        Surroundings {
+            config: self.config.clone(),
+            metrics: self.metrics_so_far.fingerprint(),
+        }
     }
 
     /// Puts the weights in place of earlier ones.

@@ -46,7 +46,13 @@ pub(crate) fn mackrl(words: &[&str]) -> Command {
 
 /// The command that begins the small run in `folder`, with further settings.
 pub(crate) fn train(folder: &Path, settings: &[&str]) -> Command {
-    let mut command = mackrl(&["train", "--map", "3m", "--threads", "1", "--out"]);
+    train_on(1, folder, settings)
+}
+
+/// As [`train`], on some threads.
+pub(crate) fn train_on(threads: usize, folder: &Path, settings: &[&str]) -> Command {
+    let threads = threads.to_string();
+    let mut command = mackrl(&["train", "--map", "3m", "--threads", &threads, "--out"]);
     command.arg(folder);
     for setting in SMALL.iter().chain(settings) {
         command.args(["--set", setting]);
@@ -59,6 +65,13 @@ pub(crate) fn resume(folder: &Path, threads: usize) -> Command {
     let mut command = mackrl(&["resume", "--threads", &threads.to_string()]);
     command.arg(folder);
     command
+}
+
+/// SHA-256 in hexadecimal.
+pub(crate) fn sha256(content: &[u8]) -> String {
+    use sha2::Digest;
+    let hash = sha2::Sha256::digest(content);
+    hash.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Runs to the end, and expects this exit code; gives what stderr holds.

@@ -228,3 +228,77 @@ impl Trainer {
         learnt
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Config;
+
+    fn trainer() -> Trainer {
+        let mut config = Config::default();
+        config.policy.hidden = 5;
+        config.learner.environments = 5;
+        config.test.episodes = 1;
+        Trainer::new(&config, 2).unwrap()
+    }
+
+    #[test]
+    fn examining_a_sound_update_is_that_update() {
+        let (mut examined, mut updated) = (trainer(), trainer());
+        // The first iteration is a test, the second an update.
+        for _ in 0..2 {
+            let examination = examined.examine().unwrap();
+            updated.update().unwrap();
+            assert_eq!(examination.refused, None);
+            assert_eq!(examination.origin(), None);
+            assert_eq!(examined.checkpoint(), updated.checkpoint());
+        }
+        let parts = examined.examine().unwrap().tensors;
+        let of = |part: Part| parts.iter().filter(|tensor| tensor.part == part).count();
+        assert_eq!(of(Part::World), 2);
+        assert_eq!(
+            of(Part::Acting),
+            18,
+            "three controllers with six tensors each"
+        );
+        assert!(of(Part::Before) > 0 && of(Part::Critic) > 0);
+        assert!(of(Part::Backward) > 0 && of(Part::Step) > 0);
+    }
+
+    #[test]
+    fn the_first_broken_tensor_is_the_origin_of_all_that_follow() {
+        for test_is_due in [true, false] {
+            let mut trainer = trainer();
+            if !test_is_due {
+                trainer.update().unwrap();
+            }
+            let before = trainer.checkpoint();
+            let mut state = trainer.learner.state();
+            let layout = trainer.policy.layout();
+            let tensor = layout.tensors().iter();
+            let place = tensor
+                .clone()
+                .find(|tensor| tensor.name == "pair_controller.input.bias");
+            let index = place.unwrap().range.start + 2;
+            let sound = std::mem::replace(&mut state.parameters[index], f32::NAN);
+            trainer.learner.restore(&*trainer.policy, state.clone());
+            let examination = trainer.examine().unwrap();
+            let refused = examination.refused.as_ref().unwrap();
+            assert_eq!(refused.tensor, "logits of pair_controller");
+            assert_eq!(refused.moment.map(|moment| moment.update), Some(0));
+            let origin = examination.origin().unwrap();
+            assert_eq!((origin.part, origin.not_finite), (Part::Before, 1));
+            assert_eq!(origin.name, "pair_controller.input.bias");
+            assert_eq!(origin.first, Some(vec![("output".to_owned(), 2)]));
+            let broken = examination
+                .tensors
+                .iter()
+                .filter(|tensor| tensor.not_finite > 0);
+            let names: Vec<&str> = broken.map(|tensor| tensor.name.as_str()).collect();
+            assert_eq!(names[1], "pair_controller input layer");
+            state.parameters[index] = sound;
+            trainer.learner.restore(&*trainer.policy, state);
+            assert_eq!(trainer.checkpoint(), before, "nothing else has changed");
+        }
+    }
+}

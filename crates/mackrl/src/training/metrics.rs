@@ -15,6 +15,10 @@ pub const METRICS: &[(&str, &str)] = &[
     ),
     ("episode", "training episodes so far"),
     ("update", "policy updates so far"),
+    (
+        "experience_hash",
+        "hash of all states and rewards of the training episodes so far, in 16 hexadecimal digits",
+    ),
     ("epsilon", "ε of the bounded softmax in the latest batch"),
     (
         "return_mean",
@@ -147,6 +151,7 @@ pub const METRICS: &[(&str, &str)] = &[
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct MetricRow {
     entries: Vec<(String, f64)>,
+    experience_hash: Option<u64>,
 }
 
 impl MetricRow {
@@ -158,6 +163,11 @@ impl MetricRow {
             "metric `{name}` is not explained in METRICS"
         );
         self.entries.push((name, value));
+    }
+
+    /// Notes the hash of the training episodes so far.
+    pub(super) const fn set_experience_hash(&mut self, hash: u64) {
+        self.experience_hash = Some(hash);
     }
 
     /// The number called `name`, if the row has it.
@@ -177,16 +187,19 @@ impl MetricRow {
     }
 }
 
-/// A row is a JSON object; whole numbers are written without a fraction.
+/// A row is a JSON object; whole numbers are written without a fraction, the hash as a string of digits.
 impl Serialize for MetricRow {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(Some(self.entries.len()))?;
+        let mut map = serializer.serialize_map(None)?;
         for (name, value) in &self.entries {
             if is_count(name) {
                 map.serialize_entry(name, &as_count(*value))?;
             } else {
                 map.serialize_entry(name, value)?;
             }
+        }
+        if let Some(hash) = self.experience_hash {
+            map.serialize_entry("experience_hash", &format_args!("{hash:016x}"))?;
         }
         map.end()
     }

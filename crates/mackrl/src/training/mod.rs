@@ -6,13 +6,16 @@
 
 pub mod assembly;
 mod checkpoint;
+mod comparison;
 mod evaluation;
 mod examination;
+mod experience;
 mod metrics;
 mod trainer;
 mod weights;
 
 pub use checkpoint::Checkpoint;
+pub use comparison::{Difference, compare_tensors};
 pub use evaluation::{Episodes, Evaluation, evaluate, evaluate_in};
 pub use examination::{Examination, Part, TensorStatistics};
 pub use metrics::{METRICS, MetricRow};

@@ -8,6 +8,7 @@ use super::{
     Checkpoint, Evaluation, MetricRow, assembly,
     checkpoint::{Counters, Layouts, State},
     evaluation::Evaluator,
+    experience::ExperienceHash,
     write_weights,
 };
 use crate::{
@@ -33,6 +34,7 @@ pub struct Trainer {
     steps_env: u64,
     episodes: u64,
     tests: u64,
+    experience: ExperienceHash,
     next_test: u64,
     next_row: u64,
     interval: Interval,
@@ -81,6 +83,7 @@ impl Trainer {
             steps_env: 0,
             episodes: 0,
             tests: 0,
+            experience: ExperienceHash::default(),
             next_test: 0,
             next_row: config.run.metrics_interval_steps_env,
             interval: Interval::new(0),
@@ -150,6 +153,17 @@ impl Trainer {
         self.learner.updates() + self.tests
     }
 
+    /// Hash of all states and rewards of the training episodes so far: once two runs differ in it, they do so for ever.
+    #[must_use]
+    pub const fn experience_hash(&self) -> u64 {
+        self.experience.0
+    }
+
+    /// Training episodes before the latest batch.
+    pub(super) const fn episodes_before_batch(&self) -> u64 {
+        self.episodes.saturating_sub(self.batch())
+    }
+
     /// Everything that the rest of the run depends on, the configuration aside.
     #[must_use]
     pub fn checkpoint(&self) -> Checkpoint {
@@ -159,6 +173,7 @@ impl Trainer {
                 steps_env: self.steps_env,
                 episodes: self.episodes,
                 tests: self.tests,
+                experience_hash: self.experience.0,
                 next_test: self.next_test,
                 next_row: self.next_row,
                 interval_steps_env: self.interval.steps_env,
@@ -178,6 +193,7 @@ impl Trainer {
         self.steps_env = counters.steps_env;
         self.episodes = counters.episodes;
         self.tests = counters.tests;
+        self.experience = ExperienceHash(counters.experience_hash);
         self.next_test = counters.next_test;
         self.next_row = counters.next_row;
         self.interval = Interval {
@@ -253,6 +269,7 @@ impl Trainer {
         self.episodes += self.batch();
         for episode in self.rollout.batches().flat_map(|batch| &batch.episodes) {
             self.steps_env += episode.steps() as u64;
+            self.experience.add(episode);
             self.interval.note_episode(episode);
         }
         self.interval.note_update(&report, exploration);
@@ -294,6 +311,7 @@ impl Trainer {
         row.push("t_env", self.steps_env as f64);
         row.push("episode", self.episodes as f64);
         row.push("update", self.learner.updates() as f64);
+        row.set_experience_hash(self.experience.0);
         interval
             .tally
             .means()

@@ -23,7 +23,7 @@ use crate::{
 };
 
 /// Version of the format; it changes when an older program could not continue from a checkpoint.
-const FORMAT: u64 = 1;
+const FORMAT: u64 = 2;
 /// The largest count that every reader of JSON can hold: 2⁵³.
 const COUNT_MAX: u64 = 1 << 53;
 
@@ -50,6 +50,9 @@ pub(super) struct Counters {
     pub(super) steps_env: u64,
     pub(super) episodes: u64,
     pub(super) tests: u64,
+    /// Hash of all that was learnt from, in 16 hexadecimal digits: not every reader of JSON can hold 64 bits.
+    #[serde(with = "hexadecimal")]
+    pub(super) experience_hash: u64,
     /// Environment steps at which the next test is due.
     pub(super) next_test: u64,
     /// Environment steps at which the next row of metrics is due.
@@ -190,6 +193,7 @@ impl Numbers {
             steps_env,
             episodes,
             tests,
+            experience_hash: _,
             next_test,
             next_row,
             interval_steps_env,
@@ -248,6 +252,21 @@ impl Layouts<'_> {
 
     const fn has_first_moments(&self) -> bool {
         matches!(self.optimiser, OptimiserKind::Adam { .. })
+    }
+}
+
+/// 64 bits as hexadecimal digits.
+mod hexadecimal {
+    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+    pub(super) fn serialize<S: Serializer>(bits: &u64, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(&format_args!("{bits:016x}"))
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<u64, D::Error> {
+        let digits = String::deserialize(from)?;
+        u64::from_str_radix(&digits, 16)
+            .map_err(|_| D::Error::custom(format!("`{digits}`, expected 16 hexadecimal digits")))
     }
 }
 

@@ -103,13 +103,15 @@ fn counters_that_no_run_can_have_are_refused_by_name() {
         trainer.restore(&damaged).unwrap_err().to_string()
     };
     assert_eq!(
-        message("\"format\": 1", "\"format\": 2"),
-        "checkpoint has format 2, expected 1"
+        message("\"format\": 2", "\"format\": 1"),
+        "checkpoint has format 1, expected 2"
     );
     let found = message("\"tests\": 1", "\"tests\": 18446744073709551615");
     assert!(found.contains("as `tests`, expected at most"), "{found}");
     let found = message("\"critic_loss\"", "\"critic_lost\"");
     assert!(found.contains("unknown metric `critic_lost`"), "{found}");
+    let hash = message("\"experience_hash\": \"", "\"experience_hash\": \"x");
+    assert!(hash.contains("expected 16 hexadecimal digits"), "{hash}");
     let found = message("\"episodes\"", "\"episode\"");
     assert!(found.contains("unknown field `episode`"), "{found}");
 }
