@@ -203,15 +203,42 @@ fn measuring_nothing_is_a_usage_error() {
 }
 
 #[test]
-fn maps_are_listed_as_a_table_and_as_json() {
+fn the_table_of_maps_has_a_line_for_each_and_then_says_what_else_there_is() {
     let table = type_in("maps").succeeds();
+    let lines: Vec<&str> = table.lines().collect();
     let json: Vec<serde_json::Value> =
         serde_json::from_str(&type_in("maps --json").succeeds()).expect("a JSON array");
-    assert_eq!(table.lines().count(), json.len() + 1);
-    for map in json {
+    for (line, map) in lines[1..].iter().zip(&json) {
         let name = map["name"].as_str().expect("a map has a name");
-        assert!(table.contains(name), "{name} is missing in the table");
+        assert_eq!(line.split(' ').next(), Some(name));
     }
+    assert_eq!(lines[json.len() + 1], "");
+    assert!(lines[json.len() + 2].contains("matrix-game"), "{table}");
+}
+
+#[test]
+fn a_map_is_shown_with_a_picture_and_the_matrix_game_without() {
+    insta::assert_snapshot!("map_2m_vs_1z", type_in("maps 2m_vs_1z").succeeds());
+    insta::assert_snapshot!(type_in("maps matrix-game").succeeds(), @r"
+    matrix-game: 2 agents earn the entry of a payoff matrix that they choose together, in 1 step
+
+    n_actions   5
+    obs_size    5
+    state_size  12
+
+    Settings: env.matrix_game.payoffs, .distribution and .common_knowledge; `mackrl reproduce figure5` is the paper's experiment.
+    ");
+    insta::assert_snapshot!(type_in("maps 2m_vs_2z").fails(64), @r"
+    error: maps 2m_vs_2z: unknown map `2m_vs_2z`, did you mean `2m_vs_1z`?
+    hint: `mackrl maps` lists every map
+    ");
+    insta::assert_snapshot!(type_in("maps 3m --check my.toml").fails(2), @r"
+    error: the argument '[MAP]' cannot be used with '--check <FILE>'
+
+    Usage: mackrl maps <MAP>
+
+    For more information, try '--help'.
+    ");
 }
 
 /// A copy of the commented example in a folder of its own.

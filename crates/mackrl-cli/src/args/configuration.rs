@@ -4,10 +4,20 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
-use mackrl::config::{ConfigBuilder, ConfigError};
+use mackrl::config::{ConfigBuilder, ConfigError, EnvironmentConfig};
 use mackrl_env::skirmish::custom::LENGTH_MAX;
 
 use crate::bounded;
+
+/// The world called `map`, with the settings of `set`; errors about its name begin with what was `typed`.
+pub(crate) fn world(typed: &str, map: &str, set: &[String]) -> anyhow::Result<EnvironmentConfig> {
+    let quoted = serde_json::to_string(map).context("a name is a string")?;
+    let mut builder = ConfigBuilder::new().flag(typed, &format!("env.map={quoted}"))?;
+    for assignment in set {
+        builder = builder.set(assignment)?;
+    }
+    Ok(with_scenario(builder)?.build()?.env)
+}
 
 /// Lays the text of the scenario file that the map names, if it names one.
 pub(crate) fn with_scenario(builder: ConfigBuilder) -> anyhow::Result<ConfigBuilder> {

@@ -4,6 +4,7 @@
 //! (Samvelyan and others, "The StarCraft Multi-Agent Challenge", 2019) and adds the local views of [`crate::Environment`].
 //! Unit statistics and maps are data ([`unit_types`], [`scenario`]), read from the files under `units/` and `maps/`.
 
+mod actions;
 pub mod custom;
 pub mod error;
 mod face;
@@ -16,7 +17,7 @@ pub mod terrain;
 pub mod unit_types;
 
 pub use error::SkirmishError;
-pub use face::{BattleTally, Skirmish, SkirmishKnowledge};
+pub use face::{BattleTally, Layout, Skirmish, SkirmishKnowledge};
 pub use scenario::Scenario;
 pub use settings::{Compatibility, SkirmishSettings};
 pub use unit_types::UnitData;

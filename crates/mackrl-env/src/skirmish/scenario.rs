@@ -58,6 +58,22 @@ const MAPS: &[(&str, &str)] = &[
     ),
 ];
 
+/// SMAC's names for teams: the types in alphabetical order, which is that of agents, and the name.
+const MAP_TYPES: &[(&[&str], &str)] = &[
+    (&["marine"], "marines"),
+    (&["marauder", "marine", "medivac"], "MMM"),
+    (&["stalker", "zealot"], "stalkers_and_zealots"),
+    (&["stalker"], "stalkers"),
+    (
+        &["colossus", "stalker", "zealot"],
+        "colossi_stalkers_zealots",
+    ),
+    (&["zealot"], "zealots"),
+    (&["hydralisk"], "hydralisks"),
+    (&["baneling", "zergling"], "bane"),
+    (&["colossus"], "colossus"),
+];
+
 /// A map file as it is written.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -160,6 +176,8 @@ pub struct Scenario {
     pub enemy_order: EnemyOrder,
     /// Middle of the enemies' places, which formations are relative to.
     pub enemy_centre: [f32; 2],
+    /// Groups of allies and of enemies, as they were written.
+    pub armies: [Vec<Group>; 2],
     /// Races of allies and enemies.
     pub races: [Race; 2],
     /// The game's numbers of the types, as `field.profiles`.
@@ -231,9 +249,22 @@ impl Scenario {
             enemy_centre: [middle(0), middle(1)],
             recruits: allies.into_iter().chain(enemies).collect(),
             enemy_order: file.enemies.order,
+            armies: [file.allies.groups.clone(), file.enemies.groups.clone()],
             races: [file.allies.race, file.enemies.race],
             type_ids: types.iter().map(|unit| unit.type_id).collect(),
         })
+    }
+
+    /// What SMAC calls a team of these types (`map_type`), if it has a name for it.
+    #[must_use]
+    pub fn map_type(&self) -> Option<&'static str> {
+        let mut kinds: Vec<&str> = self.recruits[..self.agents]
+            .iter()
+            .map(|agent| self.field.profiles[usize::from(agent.kind)].name.as_str())
+            .collect();
+        kinds.dedup();
+        let known = MAP_TYPES.iter().find(|(types, _)| *types == kinds);
+        known.map(|(_, name)| *name)
     }
 
     /// Number of enemies.

@@ -63,12 +63,18 @@ impl EnvironmentConfig {
         (self.scenario.is_empty() && self.map.ends_with(".toml")).then_some(self.map.as_str())
     }
 
+    /// Whether the world is the matrix game, not a skirmish.
+    #[must_use]
+    pub fn is_matrix_game(&self) -> bool {
+        self.scenario.is_empty() && self.map == MATRIX_GAME
+    }
+
     /// Builds the world.
     ///
     /// # Errors
     /// [`Error::Config`] if the map is unknown or a setting is out of its range.
     pub fn make(&self) -> Result<Box<dyn Environment>, Error> {
-        if self.scenario.is_empty() && self.map == MATRIX_GAME {
+        if self.is_matrix_game() {
             return registry::make_matrix_game(self.matrix_game)
                 .map(|game| Box::new(game) as _)
                 .map_err(|error| Error::Config(error.to_string()));

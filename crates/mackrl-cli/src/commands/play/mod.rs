@@ -8,11 +8,11 @@ mod view;
 use std::path::Path;
 
 use anyhow::Context;
-use mackrl::config::{ConfigBuilder, EnvironmentConfig};
+use mackrl::config::EnvironmentConfig;
 use mackrl_env::{EpisodeKey, Stream, registry};
 
 use crate::{
-    args::{PlayArgs, with_scenario},
+    args::{PlayArgs, world},
     failure::Failure,
     output,
     reproduce::meter::Meter,
@@ -56,17 +56,8 @@ fn maps(args: &PlayArgs) -> anyhow::Result<Vec<EnvironmentConfig>> {
         ALL => registry::map_names(),
         name => vec![name],
     };
-    names.into_iter().map(|name| map(args, name)).collect()
-}
-
-fn map(args: &PlayArgs, name: &str) -> anyhow::Result<EnvironmentConfig> {
-    let quoted = serde_json::to_string(name).context("a name is a string")?;
-    let typed = format!("--map {name}");
-    let mut builder = ConfigBuilder::new().flag(&typed, &format!("env.map={quoted}"))?;
-    for assignment in &args.set {
-        builder = builder.set(assignment)?;
-    }
-    Ok(with_scenario(builder)?.build()?.env)
+    let map = |name: &str| world(&format!("--map {name}"), name, &args.set);
+    names.into_iter().map(map).collect()
 }
 
 /// Plays many episodes of each map by each policy, and prints how they went.

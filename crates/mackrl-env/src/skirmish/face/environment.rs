@@ -6,10 +6,11 @@ use crate::{
     Action, AgentId, Environment, EnvironmentSpec, EpisodeEnd, EpisodeKey, EpisodeStatistics,
     IllegalAction, ObservationMut, PriorKnowledge, TimeStep,
     skirmish::{
+        actions::{DIRECTIONS, MOVES_FROM, NO_OPERATION, STOP, TARGETS_FROM},
         error::SkirmishError,
         face::{
             knowledge::SkirmishKnowledge,
-            layout::{Layout, TARGET_ACTIONS_FROM},
+            layout::Layout,
             observation::Scene,
             reward::{Outcome, Rewards},
             state_vector::cooldown_scale,
@@ -105,6 +106,18 @@ impl Skirmish {
         &self.battle
     }
 
+    /// Sizes of what agents and critics are shown.
+    #[must_use]
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// The greatest return before scaling: the enemies' life and shields, their deaths, and the victory.
+    #[must_use]
+    pub fn max_reward(&self) -> f32 {
+        self.rewards.greatest()
+    }
+
     /// The map.
     #[must_use]
     pub fn scenario(&self) -> &Scenario {
@@ -185,16 +198,18 @@ impl Skirmish {
             let (x, y) = (self.battle.state().x[agent], self.battle.state().y[agent]);
             let far = self.settings.move_amount;
             let order = match action.index() {
-                0 => continue,
-                1 => Order::Stop,
-                2 => Order::Move { to: [x, y + far] },
-                3 => Order::Move { to: [x, y - far] },
-                4 => Order::Move { to: [x + far, y] },
-                5 => Order::Move { to: [x - far, y] },
+                NO_OPERATION => continue,
+                STOP => Order::Stop,
+                direction @ MOVES_FROM..TARGETS_FROM => {
+                    let [dx, dy] = DIRECTIONS[direction - MOVES_FROM];
+                    Order::Move {
+                        to: [x + dx * far, y + dy * far],
+                    }
+                }
                 target => {
                     let target = self
                         .knowledge
-                        .target(agent, target - TARGET_ACTIONS_FROM)
+                        .target(agent, target - TARGETS_FROM)
                         .expect("actions are checked to be available");
                     let target = unit_index(target);
                     if self.knowledge.is_healer(agent) {

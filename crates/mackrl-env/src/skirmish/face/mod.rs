@@ -9,6 +9,7 @@ mod state_vector;
 
 pub use environment::{BattleTally, Skirmish};
 pub use knowledge::SkirmishKnowledge;
+pub use layout::Layout;
 
 #[cfg(test)]
 mod tests;
