@@ -80,7 +80,7 @@ fn an_unknown_flag_is_a_usage_error() {
 
       tip: a similar argument exists: '--json'
 
-    Usage: mackrl maps --json
+    Usage: mackrl maps --json [MAP]
 
     For more information, try '--help'.
     ");
@@ -153,7 +153,7 @@ fn the_printed_configuration_can_be_read_back() {
 fn an_unknown_map_points_to_the_list() {
     insta::assert_snapshot!(type_in("bench env --map nowhere").fails(64), @r"
     error: --map nowhere: unknown map `nowhere`
-    hint: `mackrl maps` lists every map
+    hint: `mackrl maps` lists every map; the name of a scenario file ends in .toml
     ");
 }
 
@@ -230,7 +230,7 @@ fn a_map_is_shown_with_a_picture_and_the_matrix_game_without() {
     ");
     insta::assert_snapshot!(type_in("maps 2m_vs_2z").fails(64), @r"
     error: maps 2m_vs_2z: unknown map `2m_vs_2z`, did you mean `2m_vs_1z`?
-    hint: `mackrl maps` lists every map
+    hint: `mackrl maps` lists every map; the name of a scenario file ends in .toml
     ");
     insta::assert_snapshot!(type_in("maps 3m --check my.toml").fails(2), @r"
     error: the argument '[MAP]' cannot be used with '--check <FILE>'
@@ -306,6 +306,53 @@ fn a_broken_scenario_names_file_line_and_column() {
     ");
     let play = type_in_folder("play --map my.toml", folder.path()).fails(64);
     assert_eq!(check, play);
+}
+
+#[test]
+fn what_is_no_scenario_is_refused_at_once_whatever_it_is() {
+    let folder = tempfile::tempdir().expect("a folder for the story");
+    let place = |name: &str| folder.path().join(name);
+    std::fs::create_dir(place("folder.toml")).expect("writable");
+    std::fs::write(place("binary.toml"), [0, 159, 146, 150]).expect("writable");
+    std::fs::write(place("empty.toml"), "").expect("writable");
+    let sparse = std::fs::File::create(place("sparse.toml")).expect("writable");
+    sparse.set_len(1 << 40).expect("files may have holes");
+    let mut cases = vec![
+        ("folder", 74, "it is a folder, expected a file"),
+        ("binary", 64, "not UTF-8 text at byte 1"),
+        (
+            "empty",
+            64,
+            "empty.toml:1:1: found an empty file, expected a scenario",
+        ),
+        ("sparse", 65, "is too long, expected at most 262144 bytes"),
+        ("nothing", 74, "No such file"),
+    ];
+    // A pipe without a writer: whoever opens it waits for ever.
+    let mkfifo = std::process::Command::new("mkfifo")
+        .arg(place("pipe.toml"))
+        .status();
+    if mkfifo.is_ok_and(|status| status.success()) {
+        cases.push(("pipe", 74, "it is a pipe or a device, expected a file"));
+    }
+    for (name, code, words) in cases {
+        for command in ["maps --check", "maps", "play --map", "train --map"] {
+            let error = type_in_folder(&format!("{command} {name}.toml"), folder.path());
+            let error = error.fails(code);
+            assert!(error.contains(words), "{command}: {error}");
+        }
+    }
+}
+
+#[test]
+fn a_scenario_may_be_called_like_a_world_of_ours() {
+    let folder = tempfile::tempdir().expect("a folder for the story");
+    let map = include_str!("../../../maps/2m_vs_1z.toml");
+    std::fs::write(folder.path().join("matrix-game.toml"), map).expect("writable");
+    let checked = type_in_folder("maps --check matrix-game.toml --json", folder.path());
+    let checked: serde_json::Value =
+        serde_json::from_str(&checked.succeeds()).expect("a JSON array");
+    assert_eq!(checked[0]["n_enemies"], 1);
 }
 
 #[test]

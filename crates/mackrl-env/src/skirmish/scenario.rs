@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, de::Error};
 
 use crate::skirmish::{
     error::SkirmishError,
@@ -119,6 +119,7 @@ pub struct Group {
     /// How many, ≥ 1.
     pub count: usize,
     /// The point, in map units.
+    #[serde(deserialize_with = "exactly")]
     pub at: [f32; 2],
 }
 
@@ -141,9 +142,9 @@ pub enum EnemyOrder {
     /// Nothing: they fight what comes near.
     None,
     /// Attack-move to a point. The army keeps its formation, as a group does that is ordered beyond its own extent.
-    AttackMove([f32; 2]),
+    AttackMove(#[serde(deserialize_with = "exactly")] [f32; 2]),
     /// Attack-move to a random point between two, drawn once an episode.
-    AttackMoveBetween([[f32; 2]; 2]),
+    AttackMoveBetween(#[serde(deserialize_with = "exactly_points")] [[f32; 2]; 2]),
     /// Attack the other side's units, wherever they are.
     Hunt,
 }
@@ -323,6 +324,23 @@ impl MapFile {
             EnemyOrder::AttackMoveBetween(ends) => ends.into_iter().try_for_each(check_point),
         }
     }
+}
+
+/// Reads a point. Arrays as such would be read up to their length, and what is written beyond it passed over.
+pub(super) fn exactly<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f32; 2], D::Error> {
+    pair(Vec::deserialize(deserializer)?, "numbers, [x, y]")
+}
+
+fn exactly_points<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[[f32; 2]; 2], D::Error> {
+    let points: Vec<Vec<f32>> = Vec::deserialize(deserializer)?;
+    let [from, to] = pair(points, "points, [[x, y], [x, y]]")?;
+    Ok([pair(from, "numbers, [x, y]")?, pair(to, "numbers, [x, y]")?])
+}
+
+fn pair<T, E: Error>(list: Vec<T>, of_what: &str) -> Result<[T; 2], E> {
+    let length = list.len();
+    let expected = || E::custom(format!("found an array of {length}, expected 2 {of_what}"));
+    list.try_into().map_err(|_| expected())
 }
 
 /// Mean of the groups' points, weighted by their sizes.
