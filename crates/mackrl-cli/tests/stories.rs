@@ -281,6 +281,35 @@ fn scripted_teams_play_to_the_same_numbers_on_any_number_of_threads() {
 }
 
 #[test]
+fn a_report_is_the_same_on_any_number_of_threads_and_names_its_command() {
+    let folder = tempfile::tempdir().expect("a folder for the story");
+    let command = "mackrl play --map 3m --policy all --episodes 7 --seed 5 --out reports/mine";
+    let read = |name: &str| {
+        let file = folder.path().join("reports/mine").join(name);
+        std::fs::read_to_string(file).expect("a file of the report")
+    };
+    let mut reports = ["1", "3"].map(|threads| {
+        let line = command.replacen("mackrl ", "", 1) + " --threads " + threads;
+        type_in_folder(&line, folder.path()).succeeds();
+        [read("scripted.json"), read("README.md")]
+    });
+    assert_eq!(reports[0], reports[1]);
+    let [json, page] = std::mem::take(&mut reports[0]);
+    assert!(page.contains(&format!("\n{command}\n")), "{page}");
+    let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    assert_eq!(json["command"], command);
+    let rows = json["rows"].as_array().expect("an array");
+    let heading = "| map | random | idle | nearest | focus-fire | kite |\n";
+    assert_eq!((rows.len(), page.matches(heading).count()), (5, 2));
+    let won = rows[4]["battle_won_mean"].as_f64().expect("a number");
+    let line = page.lines().find(|line| line.starts_with("| `3m` |"));
+    assert!(
+        line.expect("a row").contains(&format!("| {won:.3} ± ")),
+        "{page}"
+    );
+}
+
+#[test]
 fn a_scenario_of_ones_own_is_checked_played_and_trained_on() {
     let folder = folder_with_example();
     let story = |line: &str| type_in_folder(line, folder.path());

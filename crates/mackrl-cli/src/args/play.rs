@@ -1,6 +1,9 @@
 //! The command that plays with scripted teams.
 
-use std::{num::NonZeroU64, path::PathBuf};
+use std::{
+    num::NonZeroU64,
+    path::{Path, PathBuf},
+};
 
 use clap::{Args, ValueEnum};
 use mackrl_env::skirmish::scripted::ScriptedPolicy;
@@ -12,12 +15,14 @@ use crate::args::runs::ThreadsArgs;
 /// Prints the mean and the standard error of battles won, return, episode length, and allies and enemies lost. Scripted agents
 /// decide from their own local views, as trained ones do. The number of threads changes the speed and nothing else.
 ///
+/// --out keeps them in a folder, as JSON and as a page with tables of maps by policies; results/scripted was made so.
+///
 /// --record writes one episode as JSON: the map, the settings, the seed, every action and a hash of the state after every
 /// step. --replay plays such a file again and says where it first differs, if it does. --svg draws one step of it.
 ///
 /// Examples:
 ///   mackrl play --map 2s3z --policy focus-fire --episodes 1000 --json
-///   mackrl play --map all --policy all
+///   mackrl play --map all --policy all --episodes 1000 --out results/scripted
 ///   mackrl play --map ./my.toml --policy kite --svg battle.svg --step 12
 ///   mackrl play --map 3m --record episode.json && mackrl play --replay episode.json
 #[derive(Debug, Args)]
@@ -50,6 +55,10 @@ pub(crate) struct PlayArgs {
     #[arg(long)]
     pub(crate) json: bool,
 
+    /// Write scripted.json and README.md into this folder too; made if it is not there
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["record", "replay", "svg"])]
+    pub(crate) out: Option<PathBuf>,
+
     /// Write the first episode to this file, and play no other
     #[arg(long, value_name = "FILE", help_heading = "One episode")]
     pub(crate) record: Option<PathBuf>,
@@ -66,6 +75,23 @@ pub(crate) struct PlayArgs {
     /// Step to draw: 0 is the start [default: half of the episode]
     #[arg(long, value_name = "T", requires = "svg", help_heading = "One episode")]
     pub(crate) step: Option<usize>,
+}
+
+impl PlayArgs {
+    /// The command that writes the same report into `folder`.
+    pub(crate) fn command(&self, folder: &Path) -> String {
+        let policy = self.policy.to_possible_value();
+        let policy = policy.map_or_else(String::new, |value| value.get_name().to_owned());
+        let settings = self.set.iter().map(|setting| format!(" --set {setting}"));
+        format!(
+            "mackrl play --map {} --policy {policy} --episodes {} --seed {}{} --out {}",
+            self.map,
+            self.episodes,
+            self.seed,
+            settings.collect::<String>(),
+            folder.display()
+        )
+    }
 }
 
 /// A scripted policy, or all of them.

@@ -2,6 +2,7 @@
 
 mod episode;
 mod recording;
+mod report;
 mod statistics;
 mod view;
 
@@ -19,6 +20,7 @@ use crate::{
 };
 use episode::Episode;
 use recording::Recording;
+use report::Report;
 use statistics::{Row, play_many};
 
 /// The word that stands for every map.
@@ -66,6 +68,9 @@ fn many(
     maps: &[EnvironmentConfig],
     policies: &[mackrl_env::skirmish::scripted::ScriptedPolicy],
 ) -> anyhow::Result<()> {
+    if let Some(folder) = &args.out {
+        report::make_folder(folder)?;
+    }
     let meter = Meter::new("episodes");
     let each = usize::try_from(args.episodes.get()).unwrap_or(usize::MAX);
     let total = each.saturating_mul(maps.len() * policies.len());
@@ -85,6 +90,9 @@ fn many(
             )?;
             rows.push(summary);
         }
+    }
+    if let Some(folder) = &args.out {
+        Report::new(args.command(folder), &rows).write(folder)?;
     }
     match (&rows[..], args.json) {
         ([row], true) => output::print_json(row),
