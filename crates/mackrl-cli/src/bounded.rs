@@ -56,7 +56,7 @@ mod tests {
     fn a_file_is_read_up_to_its_bound_and_not_beyond() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file");
-        std::fs::write(&path, [7; 11]).unwrap();
+        fs::write(&path, [7; 11]).unwrap();
         assert_eq!(read(&path, 11).unwrap(), [7; 11]);
         assert!(
             read(&path, 10)
