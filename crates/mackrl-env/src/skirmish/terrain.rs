@@ -237,7 +237,7 @@ impl Terrain {
     /// Whether a disc can go straight from `from` to `to`, looked at twice a map unit.
     fn is_clear(&self, from: [f32; 2], to: [f32; 2], radius: f32) -> bool {
         let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
-        let looks = rounded_up(2.0 * (dx * dx + dy * dy).sqrt()).max(1.0);
+        let looks = (2.0 * (dx * dx + dy * dy).sqrt()).ceil().max(1.0);
         // Touching a wall by a little is no obstacle: one slides along it.
         let radius = 0.9 * radius;
         // Looks for each map unit along the longer axis, to leave out those that cannot get near a wall.
@@ -248,7 +248,7 @@ impl Terrain {
             let rings = cell_index(cell_of(x), cell_of(y)).map_or(0, |cell| self.clearance[cell]);
             if rings >= 2 {
                 let spare = (f32::from(rings) - 2.01).max(0.0);
-                look += 1.0 + rounded_down(spare * looks_per_unit);
+                look += 1.0 + (spare * looks_per_unit).floor();
                 continue;
             }
             if self.touches_wall(x, y, radius) {
@@ -275,21 +275,14 @@ impl Terrain {
         let (east, north) = ((cell_x + 1) as f32 - x, (cell_y + 1) as f32 - y);
         let square = radius * radius;
         let [east, west, north, south] = [east, west, north, south].map(|gap| gap * gap);
-        // In the order of the neighbours: faces, then corners.
-        let gaps = [
-            east,
-            west,
-            north,
-            south,
-            east + north,
-            east + south,
-            west + north,
-            west + south,
-        ];
-        let near = gaps.iter().zip(1..).fold(0, |near, (gap, side)| {
-            near | u16::from(*gap < square) << side
-        });
-        walls & near != 0
+        let corners = [east + north, east + south, west + north, west + south];
+        let [northeast, southeast, northwest, southwest] = corners;
+        [
+            east, west, north, south, northeast, southeast, northwest, southwest,
+        ]
+        .into_iter()
+        .enumerate()
+        .any(|(side, gap)| walls & (2 << side) != 0 && gap < square)
     }
 
     /// The point of the map nearest to (`x`, `y`).
@@ -393,22 +386,6 @@ fn pushed_out_of_cell(x: f32, y: f32, radius: f32, cell_x: i32, cell_y: i32) -> 
 )]
 pub(crate) fn cell_of(coordinate: f32) -> i32 {
     coordinate as i32
-}
-
-/// The greatest integer that is at most `value`, which is small and ≥ 0: what `floor` gives, without a call where the processor
-/// that is compiled for has no instruction for it.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "counts of looks along a way across the map"
-)]
-fn rounded_down(value: f32) -> f32 {
-    value as i32 as f32
-}
-
-/// The least integer that is at least `value`, which is small and ≥ 0.
-fn rounded_up(value: f32) -> f32 {
-    let below = rounded_down(value);
-    if below < value { below + 1.0 } else { below }
 }
 
 fn cell_index(x: i32, y: i32) -> Option<usize> {
