@@ -24,7 +24,7 @@ use super::{
     disk::{self, Disk, cannot},
     manifest::{FORMAT, Fingerprint, Manifest},
 };
-use crate::failure::Failure;
+use crate::{failure::Failure, provenance::CODE};
 
 const CHECKPOINTS: &str = "checkpoints";
 const TENSORS: &str = "tensors.safetensors";
@@ -94,7 +94,7 @@ fn make(
     ];
     let manifest = Manifest {
         format: FORMAT,
-        version: env!("CARGO_PKG_VERSION").to_owned(),
+        code: CODE.to_owned(),
         config,
         metrics,
         files: contents

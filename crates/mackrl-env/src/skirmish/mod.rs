@@ -6,6 +6,7 @@
 
 mod actions;
 pub mod custom;
+mod encounter;
 pub mod error;
 mod face;
 mod paths;
@@ -16,8 +17,14 @@ mod settings;
 pub mod terrain;
 pub mod unit_types;
 
+pub use encounter::Encounter;
 pub use error::SkirmishError;
-pub use face::{BattleTally, Layout, Skirmish, SkirmishKnowledge};
+pub use face::{BattleTally, Face, Layout, Skirmish, SkirmishKnowledge};
 pub use scenario::Scenario;
 pub use settings::{Compatibility, SkirmishSettings};
 pub use unit_types::UnitData;
+
+/// Version of the rules and of their data: one key and the same actions give the same battle in every program with this number.
+///
+/// It is raised whenever `tests/golden/skirmish_hashes.txt` is recorded anew.
+pub const SIMULATOR_VERSION: u32 = 2;

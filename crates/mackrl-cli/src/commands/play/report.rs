@@ -5,7 +5,8 @@ use std::{fmt::Write as _, fs, path::Path};
 use anyhow::Context;
 use serde::Serialize;
 
-use super::{statistics::Row, write};
+use super::statistics::Row;
+use crate::{output::write_file, provenance::CODE};
 
 /// Names of the files.
 const DATA: &str = "scripted.json";
@@ -16,8 +17,8 @@ const PAGE: &str = "README.md";
 pub(super) struct Report<'a> {
     /// The command that makes the same files again, byte for byte.
     command: String,
-    /// Version of the program that made them.
-    program: &'static str,
+    /// Version and source of the program that made them.
+    code: &'static str,
     rows: &'a [Row],
 }
 
@@ -32,7 +33,7 @@ impl<'a> Report<'a> {
     pub(super) fn new(command: String, rows: &'a [Row]) -> Self {
         Self {
             command,
-            program: env!("CARGO_PKG_VERSION"),
+            code: CODE,
             rows,
         }
     }
@@ -40,20 +41,18 @@ impl<'a> Report<'a> {
     /// Writes both files.
     pub(super) fn write(&self, folder: &Path) -> anyhow::Result<()> {
         let json = serde_json::to_string_pretty(self).context("cannot write the rows as JSON")?;
-        write(&folder.join(DATA), (json + "\n").as_bytes())?;
-        write(&folder.join(PAGE), self.page().as_bytes())
+        write_file(&folder.join(DATA), (json + "\n").as_bytes())?;
+        write_file(&folder.join(PAGE), self.page().as_bytes())
     }
 
     fn page(&self) -> String {
-        let Self {
-            command, program, ..
-        } = self;
+        let Self { command, code, .. } = self;
         format!(
             "# How scripted teams fare\n\n\
              Means over episodes, each ± its standard error. Every script decides from the agents' own local views;\n\
              `crates/mackrl-env/src/skirmish/scripted/mod.rs` says how. An error of 0 means that all episodes ended alike, which they may\n\
              not always do: of n such episodes, up to 3/n could have gone otherwise (with 95 % confidence).\n\n\
-             [`{DATA}`]({DATA}) holds all numbers: episode lengths and losses of either side too. Version {program} made both files by\n\n\
+             [`{DATA}`]({DATA}) holds all numbers: episode lengths and losses of either side too. Version {code} made both files by\n\n\
              ```text\n{command}\n```\n\n\
              and the same command makes them again, byte for byte, on any number of threads.\n\n\
              ## Share of battles won\n\n{}\n## Return\n\n20 is a clean victory; what grows back on an enemy pays again.\n\n{}",

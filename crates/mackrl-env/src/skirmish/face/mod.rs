@@ -6,10 +6,12 @@ mod layout;
 mod observation;
 mod reward;
 mod state_vector;
+mod view;
 
-pub use environment::{BattleTally, Skirmish};
+pub use environment::Skirmish;
 pub use knowledge::SkirmishKnowledge;
 pub use layout::Layout;
+pub use view::{BattleTally, Face};
 
 #[cfg(test)]
 mod tests;

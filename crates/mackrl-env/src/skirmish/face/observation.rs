@@ -5,7 +5,7 @@ use crate::{
     skirmish::{
         actions::{MOVES_FROM, NO_OPERATION, STOP, TARGETS_FROM},
         face::{knowledge::SkirmishKnowledge, layout::Layout},
-        rules::{Battle, Profile, Unit},
+        rules::{BattleState, Battlefield, Profile, Unit},
     },
 };
 
@@ -14,7 +14,10 @@ use crate::{
 pub(super) struct Scene<'a> {
     pub(super) layout: &'a Layout,
     pub(super) knowledge: &'a SkirmishKnowledge,
-    pub(super) battle: &'a Battle,
+    /// What never changes.
+    pub(super) field: &'a Battlefield,
+    /// Everybody, wherever that was learnt.
+    pub(super) state: &'a BattleState,
     pub(super) last_actions: &'a [Option<Action>],
     pub(super) sight_range: f32,
     /// Part of the episode's limit that has passed, in \[0, 1\].
@@ -63,7 +66,7 @@ impl Scene<'_> {
 
     /// Whether `action` is available to `agent`.
     pub(super) fn is_available(&self, agent: usize, action: usize) -> bool {
-        let state = self.battle.state();
+        let state = self.state;
         if !state.units[agent].is_alive() {
             return action == NO_OPERATION;
         }
@@ -81,7 +84,7 @@ impl Scene<'_> {
 
     /// Whether `agent` can choose its target number `target`, which lives and is in range.
     fn can_aim(&self, agent: usize, target: usize) -> bool {
-        let state = self.battle.state();
+        let state = self.state;
         let Some(target) = self.knowledge.target(agent, target) else {
             return false;
         };
@@ -94,7 +97,7 @@ impl Scene<'_> {
 
     /// Entity features \[M, F\]: position, life, shield, kind; zeros for the dead.
     fn write_entities(&self, entity_mf: &mut [f32]) {
-        let state = self.battle.state();
+        let state = self.state;
         for (index, row) in entity_mf
             .chunks_exact_mut(self.layout.entity_features())
             .enumerate()
@@ -126,7 +129,7 @@ impl Scene<'_> {
         observation_o: &mut [f32],
         available_a: &mut [bool],
     ) -> EntitySet {
-        let state = self.battle.state();
+        let state = self.state;
         let own = &state.units[agent];
         available_a.fill(false);
         let observation_o = if self.layout.obs_timestep_number {
@@ -179,7 +182,7 @@ impl Scene<'_> {
 
     /// Walkability and heights around an agent, if shown.
     fn write_ground(&self, agent: usize, row: &mut Cursor<'_>) {
-        let state = self.battle.state();
+        let state = self.state;
         let (x, y) = (state.x[agent], state.y[agent]);
         if self.layout.obs_pathing_grid {
             for value in self.knowledge.pathing(x, y) {
@@ -209,7 +212,7 @@ impl Scene<'_> {
         let can_shoot = self.knowledge.is_in_shooting_range(dx, dy);
         row.put(f32::from(u8::from(flag.unwrap_or(can_shoot))));
         self.write_unit(index, dx, dy, self.layout.enemy_shields, row);
-        let kind = usize::from(self.battle.state().units[index].kind);
+        let kind = usize::from(self.state.units[index].kind);
         row.put_one_hot(self.layout.enemy_type[kind], self.layout.type_bits);
         can_shoot
     }
@@ -222,7 +225,7 @@ impl Scene<'_> {
         *seen |= 1 << ally;
         row.put(1.0);
         self.write_unit(ally, dx, dy, self.layout.ally_shields, row);
-        let kind = usize::from(self.battle.state().units[ally].kind);
+        let kind = usize::from(self.state.units[ally].kind);
         row.put_one_hot(self.layout.ally_type[kind], self.layout.type_bits);
         if self.layout.obs_last_action {
             let last = self.last_actions[ally].map(Action::index);
@@ -232,7 +235,7 @@ impl Scene<'_> {
 
     /// \[distance, x, y\] over the sight range; life and shield if shown.
     fn write_unit(&self, index: usize, dx: f32, dy: f32, shields: usize, row: &mut Cursor<'_>) {
-        let unit = &self.battle.state().units[index];
+        let unit = &self.state.units[index];
         let profile = self.profile(unit);
         row.put((dx * dx + dy * dy).sqrt() / self.sight_range);
         row.put(dx / self.sight_range);
@@ -248,7 +251,7 @@ impl Scene<'_> {
 
     /// Where `index` is relative to `agent`, if it lives and is in sight.
     fn sighted(&self, agent: usize, index: usize) -> Option<(f32, f32)> {
-        let state = self.battle.state();
+        let state = self.state;
         let (dx, dy) = (
             state.x[index] - state.x[agent],
             state.y[index] - state.y[agent],
@@ -258,7 +261,7 @@ impl Scene<'_> {
     }
 
     pub(super) fn profile(&self, unit: &Unit) -> &Profile {
-        &self.battle.field().profiles[usize::from(unit.kind)]
+        &self.field.profiles[usize::from(unit.kind)]
     }
 }
 

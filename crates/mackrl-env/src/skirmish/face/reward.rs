@@ -52,7 +52,7 @@ impl Rewards {
     }
 
     /// The greatest return before scaling.
-    pub(super) fn greatest(&self) -> f32 {
+    pub(super) const fn greatest(&self) -> f32 {
         self.greatest
     }
 

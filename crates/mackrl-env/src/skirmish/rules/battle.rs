@@ -126,6 +126,13 @@ impl Battle {
         }
     }
 
+    /// Takes a unit off the field: it is dead, without the effects that a death in battle has.
+    pub fn remove(&mut self, unit: UnitIndex) {
+        let unit = &mut self.state.units[usize::from(unit)];
+        unit.life = 0.0;
+        unit.shield = 0.0;
+    }
+
     /// Plays one loop.
     pub fn advance(&mut self, chance: &mut Chance) {
         self.choose_quarries();
