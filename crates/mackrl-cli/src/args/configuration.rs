@@ -9,10 +9,16 @@ use mackrl_env::skirmish::custom::LENGTH_MAX;
 
 use crate::bounded;
 
-/// The world called `map`, with the settings of `set`; errors about its name begin with what was `typed`.
-pub(crate) fn world(typed: &str, map: &str, set: &[String]) -> anyhow::Result<EnvironmentConfig> {
+/// The world called `map`, with the settings of `set` laid over those of `builder`; errors about its name begin with what was
+/// `typed`.
+pub(crate) fn world(
+    builder: ConfigBuilder,
+    typed: &str,
+    map: &str,
+    set: &[String],
+) -> anyhow::Result<EnvironmentConfig> {
     let quoted = serde_json::to_string(map).context("a name is a string")?;
-    let mut builder = ConfigBuilder::new().flag(typed, &format!("env.map={quoted}"))?;
+    let mut builder = builder.flag(typed, &format!("env.map={quoted}"))?;
     for assignment in set {
         builder = builder.set(assignment)?;
     }
@@ -52,6 +58,10 @@ pub(crate) struct ConfigurationArgs {
     /// Map to play, as `mackrl maps` lists it, or a scenario file ending in .toml (short for `--set env.map=MAP`)
     #[arg(long, value_name = "MAP", help_heading = "Configuration")]
     pub(crate) map: Option<String>,
+
+    /// What plays the battles: simulator, or sc2 for StarCraft II on this machine (short for `--set env.engine=NAME`)
+    #[arg(long, value_name = "NAME", help_heading = "Configuration")]
+    pub(crate) env: Option<String>,
 
     /// What learns: mackrl or central-v (short for `--set policy.algorithm=NAME`)
     #[arg(long, value_name = "NAME", help_heading = "Configuration")]
@@ -104,9 +114,10 @@ impl ConfigurationArgs {
         with_scenario(builder)
     }
 
-    fn short_flags(&self) -> [(&'static str, &'static str, Option<String>); 4] {
+    fn short_flags(&self) -> [(&'static str, &'static str, Option<String>); 5] {
         [
             ("--map", "env.map", self.map.clone()),
+            ("--env", "env.engine", self.env.clone()),
             ("--algorithm", "policy.algorithm", self.algorithm.clone()),
             (
                 "--steps",

@@ -6,6 +6,7 @@ use mackrl::training::Trainer;
 
 use crate::{
     args::ResumeArgs,
+    commands::sc2,
     run_folder::{Resumption, RunFolder},
     signals::StopRequest,
     training_loop::{self, Reporting},
@@ -31,7 +32,7 @@ pub(crate) fn run(args: &ResumeArgs) -> anyhow::Result<()> {
         // The run continues from an earlier checkpoint, whether anybody reads this or not.
         let _ = writeln!(io::stderr(), "warning: {damage}; an earlier one is used");
     }
-    let mut trainer = Trainer::new(&config, threads)?;
+    let mut trainer = Trainer::in_world(&config, &sc2::world(&config)?, threads)?;
     if let Some(checkpoint) = checkpoint {
         trainer.restore(&checkpoint)?;
     }

@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use mackrl::config::ConfigBuilder;
 use mackrl_env::{StepError, random_play::RandomPlay};
 use serde::Serialize;
 
@@ -32,7 +33,12 @@ struct Player {
 }
 
 pub(super) fn run(args: &BenchEnvironmentArgs) -> anyhow::Result<()> {
-    let world = world(&format!("--map {}", args.map), &args.map, &[])?;
+    let world = world(
+        ConfigBuilder::new(),
+        &format!("--map {}", args.map),
+        &args.map,
+        &[],
+    )?;
     let players = (0..args.threads.get() as u64).map(|seed| {
         Ok(Player {
             play: RandomPlay::new(world.make()?, seed),

@@ -6,7 +6,7 @@ mod row;
 use std::path::Path;
 
 use anyhow::Context;
-use mackrl::config::ConfigError;
+use mackrl::config::{ConfigBuilder, ConfigError};
 use mackrl_env::{
     registry,
     skirmish::{Skirmish, SkirmishSettings},
@@ -51,7 +51,7 @@ fn all() -> anyhow::Result<Vec<Row>> {
 
 /// One map, with all that a person asks about it.
 fn show(name: &str, json: bool) -> anyhow::Result<()> {
-    let world = world(&format!("maps {name}"), name, &[])?;
+    let world = world(ConfigBuilder::new(), &format!("maps {name}"), name, &[])?;
     if world.is_matrix_game() {
         let game = card::MatrixGameCard::new(world.make()?.spec());
         return if json {

@@ -3,11 +3,15 @@
 mod report;
 mod statistics;
 
-use mackrl::{config::EnvironmentConfig, replay::record_script};
+use mackrl::{
+    config::{ConfigBuilder, Engine, EnvironmentConfig},
+    replay::record_script,
+};
 use mackrl_env::{EpisodeKey, Stream, registry};
 
 use crate::{
     args::{PlayArgs, world},
+    commands::sc2,
     failure::Failure,
     output,
     replay::{Opened, Summary},
@@ -33,6 +37,9 @@ pub(crate) fn run(args: &PlayArgs) -> anyhow::Result<()> {
         .into());
     };
     let key = EpisodeKey::new(args.seed, Stream::Other, 0);
+    if map.engine == Engine::Sc2 {
+        return sc2::play_one(args, map, *policy, key);
+    }
     let replay = record_script(map, *policy, key)?;
     output::write_file(file, &replay.to_bytes())?;
     let summary = Summary::of(&Opened::of(replay)?);
@@ -49,7 +56,11 @@ fn maps(args: &PlayArgs) -> anyhow::Result<Vec<EnvironmentConfig>> {
         ALL => registry::map_names(),
         name => vec![name],
     };
-    let map = |name: &str| world(&format!("--map {name}"), name, &args.set);
+    let map = |name: &str| {
+        let typed = format!("--env {}", args.env);
+        let engine = ConfigBuilder::new().flag(&typed, &format!("env.engine={}", args.env))?;
+        world(engine, &format!("--map {name}"), name, &args.set)
+    };
     names.into_iter().map(map).collect()
 }
 
