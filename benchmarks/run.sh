@@ -38,12 +38,7 @@ print(json.dumps({"command": " ".join(command), "best": best, "all": [run[field]
     uptime
 } >"$folder/machine.txt"
 
-for map in 3m 2s3z 27m_vs_30m; do
-    best "env-$map.json" env_steps_per_s_best_part max $mackrl bench env --map "$map" --steps 50000
-done
-for map in 3m 2s3z; do
-    best "env-$map-2-threads.json" env_steps_per_s_best_part max $mackrl bench env --map "$map" --steps 100000 --threads 2
-done
+benchmarks/simulator.sh "$folder" "$repetitions"
 best update.json min_ms min $mackrl bench update
 for map in 3m 2s3z; do
     for threads in 1 2; do

@@ -1,6 +1,12 @@
-//! Reading files that may be anything, devices and endless streams included.
+//! Reading files that may be anything: folders, devices, pipes that nobody writes into, files of many gigabytes.
+//!
+//! Only regular files are opened, because opening a pipe waits for a writer, who may never come.
 
-use std::{fs::File, io::Read, path::Path};
+use std::{
+    fs::{self, File, FileType},
+    io::{self, Read},
+    path::Path,
+};
 
 use anyhow::Context;
 
@@ -9,9 +15,15 @@ use crate::failure::Failure;
 /// The content of a file of at most `length_max` bytes.
 ///
 /// # Errors
-/// What the operating system says, or [`Failure::BadData`] if there is more.
+/// What the operating system says, an error of the same kind for what is no regular file, or [`Failure::BadData`] if there is
+/// more.
 pub(crate) fn read(path: &Path, length_max: usize) -> anyhow::Result<Vec<u8>> {
     let cannot = || format!("cannot read {}", path.display());
+    let kind = fs::metadata(path).with_context(cannot)?.file_type();
+    if !kind.is_file() {
+        let message = format!("it is {}, expected a file", in_words(kind));
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, message)).with_context(cannot);
+    }
     let file = File::open(path).with_context(cannot)?;
     let mut bytes = Vec::new();
     file.take(length_max as u64 + 1)
@@ -27,6 +39,15 @@ pub(crate) fn read(path: &Path, length_max: usize) -> anyhow::Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// What is no regular file.
+fn in_words(kind: FileType) -> &'static str {
+    if kind.is_dir() {
+        "a folder"
+    } else {
+        "a pipe or a device"
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -35,7 +56,7 @@ mod tests {
     fn a_file_is_read_up_to_its_bound_and_not_beyond() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file");
-        std::fs::write(&path, [7; 11]).unwrap();
+        fs::write(&path, [7; 11]).unwrap();
         assert_eq!(read(&path, 11).unwrap(), [7; 11]);
         assert!(
             read(&path, 10)
@@ -43,5 +64,19 @@ mod tests {
                 .to_string()
                 .contains("at most 10 bytes")
         );
+    }
+
+    #[test]
+    fn what_is_no_file_is_refused_before_it_is_opened() {
+        let folder = tempfile::tempdir().unwrap();
+        let refused = |path: &Path| format!("{:#}", read(path, 11).unwrap_err());
+        assert!(refused(folder.path()).ends_with("it is a folder, expected a file"));
+        if cfg!(unix) {
+            let endless = refused(Path::new("/dev/zero"));
+            assert_eq!(
+                endless,
+                "cannot read /dev/zero: it is a pipe or a device, expected a file"
+            );
+        }
     }
 }

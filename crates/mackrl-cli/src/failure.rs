@@ -300,7 +300,9 @@ fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
         return Some("`mackrl sc2 doctor --start` looks for the cause".to_owned());
     }
     match cause.downcast_ref::<ConfigError>()? {
-        ConfigError::UnknownMap { .. } => Some("`mackrl maps` lists every map".to_owned()),
+        ConfigError::UnknownMap { .. } => Some(
+            "`mackrl maps` lists every map; the name of a scenario file ends in .toml".to_owned(),
+        ),
         ConfigError::Scenario { .. } => Some(
             "examples/scenarios/sniper-alley.toml explains every line of a scenario".to_owned(),
         ),

@@ -88,7 +88,7 @@ fn an_unknown_flag_is_a_usage_error() {
 
       tip: a similar argument exists: '--json'
 
-    Usage: mackrl maps --json
+    Usage: mackrl maps --json [MAP]
 
     For more information, try '--help'.
     ");
@@ -161,7 +161,7 @@ fn the_printed_configuration_can_be_read_back() {
 fn an_unknown_map_points_to_the_list() {
     insta::assert_snapshot!(type_in("bench env --map nowhere").fails(64), @r"
     error: --map nowhere: unknown map `nowhere`
-    hint: `mackrl maps` lists every map
+    hint: `mackrl maps` lists every map; the name of a scenario file ends in .toml
     ");
 }
 
@@ -211,15 +211,42 @@ fn measuring_nothing_is_a_usage_error() {
 }
 
 #[test]
-fn maps_are_listed_as_a_table_and_as_json() {
+fn the_table_of_maps_has_a_line_for_each_and_then_says_what_else_there_is() {
     let table = type_in("maps").succeeds();
+    let lines: Vec<&str> = table.lines().collect();
     let json: Vec<serde_json::Value> =
         serde_json::from_str(&type_in("maps --json").succeeds()).expect("a JSON array");
-    assert_eq!(table.lines().count(), json.len() + 1);
-    for map in json {
+    for (line, map) in lines[1..].iter().zip(&json) {
         let name = map["name"].as_str().expect("a map has a name");
-        assert!(table.contains(name), "{name} is missing in the table");
+        assert_eq!(line.split(' ').next(), Some(name));
     }
+    assert_eq!(lines[json.len() + 1], "");
+    assert!(lines[json.len() + 2].contains("matrix-game"), "{table}");
+}
+
+#[test]
+fn a_map_is_shown_with_a_picture_and_the_matrix_game_without() {
+    insta::assert_snapshot!("map_2m_vs_1z", type_in("maps 2m_vs_1z").succeeds());
+    insta::assert_snapshot!(type_in("maps matrix-game").succeeds(), @r"
+    matrix-game: 2 agents earn the entry of a payoff matrix that they choose together, in 1 step
+
+    n_actions   5
+    obs_size    5
+    state_size  12
+
+    Settings: env.matrix_game.payoffs, .distribution and .common_knowledge; `mackrl reproduce figure5` is the paper's experiment.
+    ");
+    insta::assert_snapshot!(type_in("maps 2m_vs_2z").fails(64), @r"
+    error: maps 2m_vs_2z: unknown map `2m_vs_2z`, did you mean `2m_vs_1z`?
+    hint: `mackrl maps` lists every map; the name of a scenario file ends in .toml
+    ");
+    insta::assert_snapshot!(type_in("maps 3m --check my.toml").fails(2), @r"
+    error: the argument '[MAP]' cannot be used with '--check <FILE>'
+
+    Usage: mackrl maps <MAP>
+
+    For more information, try '--help'.
+    ");
 }
 
 /// A copy of the commented example in a folder of its own.
@@ -262,6 +289,35 @@ fn scripted_teams_play_to_the_same_numbers_on_any_number_of_threads() {
 }
 
 #[test]
+fn a_report_is_the_same_on_any_number_of_threads_and_names_its_command() {
+    let folder = tempfile::tempdir().expect("a folder for the story");
+    let command = "mackrl play --map 3m --policy all --episodes 7 --seed 5 --out reports/mine";
+    let read = |name: &str| {
+        let file = folder.path().join("reports/mine").join(name);
+        std::fs::read_to_string(file).expect("a file of the report")
+    };
+    let mut reports = ["1", "3"].map(|threads| {
+        let line = command.replacen("mackrl ", "", 1) + " --threads " + threads;
+        type_in_folder(&line, folder.path()).succeeds();
+        [read("scripted.json"), read("README.md")]
+    });
+    assert_eq!(reports[0], reports[1]);
+    let [json, page] = std::mem::take(&mut reports[0]);
+    assert!(page.contains(&format!("\n{command}\n")), "{page}");
+    let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    assert_eq!(json["command"], command);
+    let rows = json["rows"].as_array().expect("an array");
+    let heading = "| map | random | idle | nearest | focus-fire | kite |\n";
+    assert_eq!((rows.len(), page.matches(heading).count()), (5, 2));
+    let won = rows[4]["battle_won_mean"].as_f64().expect("a number");
+    let line = page.lines().find(|line| line.starts_with("| `3m` |"));
+    assert!(
+        line.expect("a row").contains(&format!("| {won:.3} ± ")),
+        "{page}"
+    );
+}
+
+#[test]
 fn a_scenario_of_ones_own_is_checked_played_and_trained_on() {
     let folder = folder_with_example();
     let story = |line: &str| type_in_folder(line, folder.path());
@@ -287,4 +343,51 @@ fn a_broken_scenario_names_file_line_and_column() {
     ");
     let play = type_in_folder("play --map my.toml", folder.path()).fails(64);
     assert_eq!(check, play);
+}
+
+#[test]
+fn what_is_no_scenario_is_refused_at_once_whatever_it_is() {
+    let folder = tempfile::tempdir().expect("a folder for the story");
+    let place = |name: &str| folder.path().join(name);
+    std::fs::create_dir(place("folder.toml")).expect("writable");
+    std::fs::write(place("binary.toml"), [0, 159, 146, 150]).expect("writable");
+    std::fs::write(place("empty.toml"), "").expect("writable");
+    let sparse = std::fs::File::create(place("sparse.toml")).expect("writable");
+    sparse.set_len(1 << 40).expect("files may have holes");
+    let mut cases = vec![
+        ("folder", 74, "it is a folder, expected a file"),
+        ("binary", 64, "not UTF-8 text at byte 1"),
+        (
+            "empty",
+            64,
+            "empty.toml:1:1: found an empty file, expected a scenario",
+        ),
+        ("sparse", 65, "is too long, expected at most 262144 bytes"),
+        ("nothing", 74, "No such file"),
+    ];
+    // A pipe without a writer: whoever opens it waits for ever.
+    let mkfifo = std::process::Command::new("mkfifo")
+        .arg(place("pipe.toml"))
+        .status();
+    if mkfifo.is_ok_and(|status| status.success()) {
+        cases.push(("pipe", 74, "it is a pipe or a device, expected a file"));
+    }
+    for (name, code, words) in cases {
+        for command in ["maps --check", "maps", "play --map", "train --map"] {
+            let error = type_in_folder(&format!("{command} {name}.toml"), folder.path());
+            let error = error.fails(code);
+            assert!(error.contains(words), "{command}: {error}");
+        }
+    }
+}
+
+#[test]
+fn a_scenario_may_be_called_like_a_world_of_ours() {
+    let folder = tempfile::tempdir().expect("a folder for the story");
+    let map = include_str!("../../../maps/2m_vs_1z.toml");
+    std::fs::write(folder.path().join("matrix-game.toml"), map).expect("writable");
+    let checked = type_in_folder("maps --check matrix-game.toml --json", folder.path());
+    let checked: serde_json::Value =
+        serde_json::from_str(&checked.succeeds()).expect("a JSON array");
+    assert_eq!(checked[0]["n_enemies"], 1);
 }

@@ -5,7 +5,7 @@ use std::{ffi::OsStr, path::Path, sync::Arc};
 use thiserror::Error;
 
 use crate::{
-    Environment, EnvironmentSpec,
+    Environment,
     matrix_game::{InvalidProbability, MatrixGame, MatrixGameSettings},
     skirmish::{
         Scenario, Skirmish, SkirmishError, SkirmishSettings, custom, scenario,
@@ -101,17 +101,6 @@ pub fn make_custom(
         }
     })?;
     Ok(Skirmish::new(Arc::new(scenario), settings.clone())?)
-}
-
-/// Sizes and limits of all environments, in the order of [`names`].
-///
-/// # Errors
-/// As [`make`].
-pub fn specs(settings: &SkirmishSettings) -> Result<Vec<EnvironmentSpec>, MakeError> {
-    names()
-        .into_iter()
-        .map(|name| Ok(make(name, settings)?.spec().clone()))
-        .collect()
 }
 
 fn nearest_name(name: &str) -> &'static str {

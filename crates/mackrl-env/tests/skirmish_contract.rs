@@ -7,32 +7,8 @@ use mackrl_env::{
     skirmish::SkirmishSettings,
 };
 
-/// Name, agents, enemies, actions, observation size, state size, episode limit: the table of the SMAC client.
-const TABLE: &[(&str, [usize; 6])] = &[
-    ("3m", [3, 3, 9, 30, 48, 60]),
-    ("8m", [8, 8, 14, 80, 168, 120]),
-    ("25m", [25, 25, 31, 250, 950, 150]),
-    ("5m_vs_6m", [5, 6, 12, 55, 98, 70]),
-    ("8m_vs_9m", [8, 9, 15, 85, 179, 120]),
-    ("10m_vs_11m", [10, 11, 17, 105, 243, 150]),
-    ("27m_vs_30m", [27, 30, 36, 285, 1170, 180]),
-    ("MMM", [10, 10, 16, 160, 290, 150]),
-    ("MMM2", [10, 12, 18, 176, 322, 180]),
-    ("2s3z", [5, 5, 11, 80, 120, 120]),
-    ("3s5z", [8, 8, 14, 128, 216, 150]),
-    ("3s5z_vs_3s6z", [8, 9, 15, 136, 230, 170]),
-    ("3s_vs_3z", [3, 3, 9, 36, 54, 150]),
-    ("3s_vs_4z", [3, 4, 10, 42, 61, 200]),
-    ("3s_vs_5z", [3, 5, 11, 48, 68, 250]),
-    ("1c3s5z", [9, 9, 15, 162, 270, 180]),
-    ("2m_vs_1z", [2, 1, 7, 16, 26, 150]),
-    ("corridor", [6, 24, 30, 156, 282, 400]),
-    ("6h_vs_8z", [6, 8, 14, 78, 140, 150]),
-    ("2s_vs_1sc", [2, 1, 7, 17, 27, 300]),
-    ("so_many_baneling", [7, 32, 38, 202, 397, 100]),
-    ("bane_vs_bane", [24, 24, 30, 336, 984, 200]),
-    ("2c_vs_64zg", [2, 64, 70, 332, 342, 400]),
-];
+/// The table of the SMAC client.
+const SMAC_MAPS: &str = include_str!("golden/smac_maps.md");
 
 #[test]
 fn every_registered_environment_keeps_the_contract() {
@@ -62,22 +38,36 @@ fn the_matrix_game_is_registered_with_its_default_settings() {
 
 #[test]
 fn maps_have_the_sizes_of_smac() {
-    let names: Vec<&str> = TABLE.iter().map(|(name, _)| *name).collect();
-    assert_eq!(registry::map_names(), names);
-    for (name, sizes) in TABLE {
-        let environment = registry::make(name, &SkirmishSettings::default())
-            .unwrap_or_else(|error| panic!("{name}: {error}"));
+    let mut names = Vec::new();
+    for line in SMAC_MAPS
+        .lines()
+        .filter(|line| line.starts_with("| "))
+        .skip(1)
+    {
+        let cells: Vec<&str> = line.split('|').map(str::trim).collect();
+        // The last number of "4+3x5+2x5+1 = **30**" is the size.
+        let number = |cell: usize| -> usize {
+            let last = cells[cell]
+                .rsplit(' ')
+                .next()
+                .expect("a cell has a last word");
+            last.trim_matches('*').parse().expect("a number")
+        };
+        let environment = registry::make(cells[1], &SkirmishSettings::default())
+            .unwrap_or_else(|error| panic!("{}: {error}", cells[1]));
         let spec = environment.spec();
         let found = [
             spec.agents,
             spec.entities - spec.agents,
+            spec.episode_limit,
             spec.actions,
             spec.observation_size,
             spec.state_size,
-            spec.episode_limit,
         ];
-        assert_eq!(found, *sizes, "{name}");
+        assert_eq!(found, [2, 3, 5, 9, 10, 11].map(number), "{}", cells[1]);
+        names.push(cells[1]);
     }
+    assert_eq!(registry::map_names(), names);
 }
 
 #[test]

@@ -66,30 +66,94 @@ fn on_3m_shooting_together_wins_and_standing_or_stumbling_loses() {
     );
 }
 
+/// Battles that the agents win soon, of every race and with healers on either side: allies, enemies, and their races.
+const WON: [(&str, &str, [&str; 2]); 6] = [
+    ("5 marine", "2 marine", ["terran", "terran"]),
+    (
+        "7 marine, 1 medivac",
+        "2 marine, 1 medivac",
+        ["terran", "terran"],
+    ),
+    ("4 stalker", "1 zealot, 1 stalker", ["protoss", "protoss"]),
+    ("1 colossus, 2 zealot", "12 zergling", ["protoss", "zerg"]),
+    ("9 zergling, 3 baneling", "1 stalker", ["zerg", "protoss"]),
+    ("5 hydralisk", "5 zergling", ["zerg", "zerg"]),
+];
+
+fn one_sided(allies: &str, enemies: &str, [ours, theirs]: [&str; 2]) -> String {
+    let groups = |army: &str, x: u8| -> String {
+        let groups = army.split(", ").map(|group| {
+            let (count, unit) = group.split_once(' ').expect("a count and a type");
+            format!("{{ unit = \"{unit}\", count = {count}, at = [{x}, 16] }}, ")
+        });
+        groups.collect()
+    };
+    format!(
+        "terrain = \"lane\"\nepisode_limit = 200\n\
+         [allies]\nrace = \"{ours}\"\ngroups = [{}]\n\
+         [enemies]\nrace = \"{theirs}\"\norder = {{ attack-move = [12, 16] }}\ngroups = [{}]\n",
+        groups(allies, 12),
+        groups(enemies, 20)
+    )
+}
+
+/// What the enemies have left in life and shields.
+fn strength(skirmish: &Skirmish) -> f64 {
+    let enemies = &skirmish.battle().state().units[skirmish.scenario().agents..];
+    let left = enemies.iter().filter(|unit| unit.is_alive());
+    left.map(|unit| f64::from(unit.life + unit.shield)).sum()
+}
+
 #[test]
-fn a_won_game_of_3m_returns_20() {
-    for compat in [Compatibility::Smac, Compatibility::Clean] {
-        let settings = SkirmishSettings {
-            compat,
-            ..SkirmishSettings::default()
-        };
-        let mut skirmish = make("3m", &settings);
-        let mut wins = 0;
-        for episode in 0..20 {
-            let mut total = 0.0;
-            play(
-                &mut skirmish,
-                ScriptedPolicy::FocusFire,
-                episode,
-                |_, _, reward| total += reward,
-            );
-            if skirmish.statistics().battle_won {
-                wins += 1;
-                assert!((total - 20.0).abs() < 1e-4, "a return of {total}");
+fn a_won_battle_returns_20_and_what_grew_back_besides() {
+    let mut regenerated = 0;
+    for (allies, enemies, races) in WON {
+        for (compat, weight) in [(Compatibility::Smac, 2.0), (Compatibility::Clean, 1.0)] {
+            let settings = SkirmishSettings {
+                compat,
+                ..SkirmishSettings::default()
+            };
+            let text = one_sided(allies, enemies, races);
+            let mut skirmish = registry::make_custom("won.toml", &text, &settings).expect("valid");
+            let scale = 20.0 / f64::from(skirmish.max_reward());
+            let mut wins = 0;
+            for episode in 0..6 {
+                let (mut total, mut grown) = (0.0, 0.0);
+                let (mut before, mut dead) = (f64::INFINITY, 0);
+                play(
+                    &mut skirmish,
+                    ScriptedPolicy::FocusFire,
+                    episode,
+                    |skirmish, _, reward| {
+                        total += f64::from(reward);
+                        let (left, killed) =
+                            (strength(skirmish), skirmish.statistics().dead_enemies);
+                        let gain = before - left + 10.0 * (killed - dead) as f64;
+                        // SMAC takes the absolute value, so that what grows back in a step pays too, and is paid for again when
+                        // it is shot off; the clean reward is paid for that alone.
+                        grown += (-gain).max(0.0);
+                        (before, dead) = (left, killed);
+                    },
+                );
+                if skirmish.statistics().battle_won {
+                    wins += 1;
+                    regenerated += usize::from(grown > 0.0);
+                    // A battle is won too when a medivac is all that is left.
+                    let spared = before + 10.0 * (skirmish.scenario().enemies() - dead) as f64;
+                    let expected = 20.0 + (weight * grown - spared) * scale;
+                    assert!(
+                        (total - expected).abs() < 1e-4,
+                        "{allies} against {enemies}, {compat:?}: {total}, not {expected}"
+                    );
+                }
             }
+            assert!(
+                wins > 0,
+                "{allies} never beat {enemies}, so nothing was shown"
+            );
         }
-        assert!(wins > 0, "no game was won, so nothing was shown");
     }
+    assert!(regenerated > 3, "hardly anything grew back: {regenerated}");
 }
 
 #[test]
@@ -105,7 +169,7 @@ fn nothing_impossible_happens_in_any_step_on_any_map() {
     }
 }
 
-/// Life and shields in range, the dead stay dead, everybody off the walls.
+/// Life, shields and energy in range, the dead stay dead, everybody off the walls.
 fn check_bodies(skirmish: &Skirmish, was_alive: &mut [bool]) {
     let (state, field) = (skirmish.battle().state(), skirmish.battle().field());
     let name = &skirmish.spec().name;
@@ -120,6 +184,11 @@ fn check_bodies(skirmish: &Skirmish, was_alive: &mut [bool]) {
             (0.0..=profile.shield).contains(&unit.shield),
             "{name}: shield {}",
             unit.shield
+        );
+        assert!(
+            (0.0..=profile.greatest_energy).contains(&unit.energy),
+            "{name}: energy {}",
+            unit.energy
         );
         assert!(
             was_alive[index] || !unit.is_alive(),

@@ -4,10 +4,26 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
-use mackrl::config::{ConfigBuilder, ConfigError};
+use mackrl::config::{ConfigBuilder, ConfigError, EnvironmentConfig};
 use mackrl_env::skirmish::custom::LENGTH_MAX;
 
 use crate::bounded;
+
+/// The world called `map`, with the settings of `set` laid over those of `builder`; errors about its name begin with what was
+/// `typed`.
+pub(crate) fn world(
+    builder: ConfigBuilder,
+    typed: &str,
+    map: &str,
+    set: &[String],
+) -> anyhow::Result<EnvironmentConfig> {
+    let quoted = serde_json::to_string(map).context("a name is a string")?;
+    let mut builder = builder.flag(typed, &format!("env.map={quoted}"))?;
+    for assignment in set {
+        builder = builder.set(assignment)?;
+    }
+    Ok(with_scenario(builder)?.build()?.env)
+}
 
 /// Lays the text of the scenario file that the map names, if it names one.
 pub(crate) fn with_scenario(builder: ConfigBuilder) -> anyhow::Result<ConfigBuilder> {
@@ -20,6 +36,13 @@ pub(crate) fn with_scenario(builder: ConfigBuilder) -> anyhow::Result<ConfigBuil
 /// Reads a scenario file, which may be anything: no more of it than a scenario may have.
 pub(crate) fn read_scenario(path: &Path) -> anyhow::Result<String> {
     let bytes = bounded::read(path, LENGTH_MAX)?;
+    if bytes.is_empty() {
+        let message = format!(
+            "{}:1:1: found an empty file, expected a scenario",
+            path.display()
+        );
+        return Err(ConfigError::Scenario { message }.into());
+    }
     String::from_utf8(bytes).map_err(|error| {
         let message = format!(
             "{}: not UTF-8 text at byte {}",

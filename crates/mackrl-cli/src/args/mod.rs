@@ -26,7 +26,7 @@ pub(crate) use analysis::{CurveStatistic, PlotArgs, ReportArgs};
 pub(crate) use bench::{
     BenchArgs, BenchCommand, BenchEnvironmentArgs, BenchTrainArgs, BenchUpdateArgs,
 };
-pub(crate) use configuration::{ConfigurationArgs, read_scenario, with_scenario};
+pub(crate) use configuration::{ConfigurationArgs, read_scenario, with_scenario, world};
 pub(crate) use inquiry::{DebugArgs, DiffArgs};
 pub(crate) use play::{PlayArgs, PolicyChoice};
 pub(crate) use replay::{ExplainArgs, ReplayArgs};
@@ -95,19 +95,27 @@ pub(crate) enum Figure {
     All(AllOptions),
 }
 
-/// List the maps that can be played, with the sizes of their arrays, or check a scenario of your own
+/// List SMAC's maps with the sizes of their arrays, show one of them, or check a scenario of your own
 ///
-/// A scenario is a TOML file: terrain, units, orders, and unit types of its own if wanted. Every command that takes --map takes
-/// a scenario file in place of a name. examples/scenarios/sniper-alley.toml explains every line of one.
+/// The list holds the 23 maps of SMAC. Besides them, --map takes `matrix-game`, the game of the paper's Figure 5, and a scenario
+/// file in place of a name.
 ///
-/// Examples: mackrl maps --json; mackrl maps --check my.toml
+/// A scenario is a TOML file: terrain, units, orders, and unit types of its own if wanted.
+/// examples/scenarios/sniper-alley.toml explains every line of one. `mackrl maps NAME --json` gives the terrain of a map in the
+/// form that a scenario takes.
+///
+/// Examples: mackrl maps --json; mackrl maps 2s3z; mackrl maps --check my.toml
 #[derive(Debug, Args)]
 pub(crate) struct MapsArgs {
-    /// Print a JSON array instead of a table
+    /// Show this map, or scenario file ending in .toml: its armies, orders, sizes and terrain
+    #[arg(value_name = "MAP", conflicts_with = "check")]
+    pub(crate) map: Option<String>,
+
+    /// Print JSON: an array of the listed maps, or an object for a map that is shown
     #[arg(long)]
     pub(crate) json: bool,
 
-    /// List this scenario file instead; an error names line and column, what was found and what was expected
+    /// List this scenario file alone; an error names line and column, what was found and what was expected
     #[arg(long, value_name = "FILE")]
     pub(crate) check: Option<PathBuf>,
 }

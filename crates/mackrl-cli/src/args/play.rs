@@ -1,6 +1,9 @@
 //! The command that plays with scripted teams.
 
-use std::{num::NonZeroU64, path::PathBuf};
+use std::{
+    num::NonZeroU64,
+    path::{Path, PathBuf},
+};
 
 use clap::{Args, ValueEnum};
 use mackrl_env::skirmish::scripted::ScriptedPolicy;
@@ -12,12 +15,14 @@ use crate::args::runs::ThreadsArgs;
 /// Prints the mean and the standard error of battles won, return, episode length, and allies and enemies lost. Scripted agents
 /// decide from their own local views, as trained ones do. The number of threads changes the speed and nothing else.
 ///
+/// --out keeps them in a folder, as JSON and as a page with tables of maps by policies; results/scripted was made so.
+///
 /// --save-replay keeps the first episode: the map, the settings, the seed, every action and a hash of the state after every
 /// step. `mackrl replay` shows it as a page, a picture or a film.
 ///
 /// Examples:
 ///   mackrl play --map 2s3z --policy focus-fire --episodes 1000 --json
-///   mackrl play --map all --policy all
+///   mackrl play --map all --policy all --episodes 1000 --out results/scripted
 ///   mackrl play --map ./my.toml --policy kite --save-replay battle.replay.gz
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
@@ -53,9 +58,30 @@ pub(crate) struct PlayArgs {
     #[arg(long)]
     pub(crate) json: bool,
 
+    /// Write scripted.json and README.md into this folder too; made if it is not there
+    #[arg(long, value_name = "DIR", conflicts_with = "save_replay")]
+    pub(crate) out: Option<PathBuf>,
+
     /// Play the first episode alone, and write it to this file as a replay
     #[arg(long, value_name = "FILE", conflicts_with = "episodes")]
     pub(crate) save_replay: Option<PathBuf>,
+}
+
+impl PlayArgs {
+    /// The command that writes the same report into `folder`.
+    pub(crate) fn command(&self, folder: &Path) -> String {
+        let policy = self.policy.to_possible_value();
+        let policy = policy.map_or_else(String::new, |value| value.get_name().to_owned());
+        let settings = self.set.iter().map(|setting| format!(" --set {setting}"));
+        format!(
+            "mackrl play --map {} --policy {policy} --episodes {} --seed {}{} --out {}",
+            self.map,
+            self.episodes,
+            self.seed,
+            settings.collect::<String>(),
+            folder.display()
+        )
+    }
 }
 
 /// A scripted policy, or all of them.

@@ -4,6 +4,7 @@
 //! (Samvelyan and others, "The StarCraft Multi-Agent Challenge", 2019) and adds the local views of [`crate::Environment`].
 //! Unit statistics and maps are data ([`unit_types`], [`scenario`]), read from the files under `units/` and `maps/`.
 
+mod actions;
 pub mod custom;
 mod encounter;
 pub mod error;
@@ -18,7 +19,7 @@ pub mod unit_types;
 
 pub use encounter::Encounter;
 pub use error::SkirmishError;
-pub use face::{BattleTally, Face, Skirmish, SkirmishKnowledge};
+pub use face::{BattleTally, Face, Layout, Skirmish, SkirmishKnowledge};
 pub use scenario::Scenario;
 pub use settings::{Compatibility, EnemyBehaviour, SkirmishSettings};
 pub use unit_types::UnitData;

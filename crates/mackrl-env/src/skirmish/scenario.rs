@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, de::Error};
 
 use crate::skirmish::{
     error::SkirmishError,
@@ -58,6 +58,22 @@ const MAPS: &[(&str, &str)] = &[
     ),
 ];
 
+/// SMAC's names for teams: the types in alphabetical order, which is that of agents, and the name.
+const MAP_TYPES: &[(&[&str], &str)] = &[
+    (&["marine"], "marines"),
+    (&["marauder", "marine", "medivac"], "MMM"),
+    (&["stalker", "zealot"], "stalkers_and_zealots"),
+    (&["stalker"], "stalkers"),
+    (
+        &["colossus", "stalker", "zealot"],
+        "colossi_stalkers_zealots",
+    ),
+    (&["zealot"], "zealots"),
+    (&["hydralisk"], "hydralisks"),
+    (&["baneling", "zergling"], "bane"),
+    (&["colossus"], "colossus"),
+];
+
 /// A map file as it is written.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -103,6 +119,7 @@ pub struct Group {
     /// How many, ≥ 1.
     pub count: usize,
     /// The point, in map units.
+    #[serde(deserialize_with = "exactly")]
     pub at: [f32; 2],
 }
 
@@ -125,9 +142,9 @@ pub enum EnemyOrder {
     /// Nothing: they fight what comes near.
     None,
     /// Attack-move to a point. The army keeps its formation, as a group does that is ordered beyond its own extent.
-    AttackMove([f32; 2]),
+    AttackMove(#[serde(deserialize_with = "exactly")] [f32; 2]),
     /// Attack-move to a random point between two, drawn once an episode.
-    AttackMoveBetween([[f32; 2]; 2]),
+    AttackMoveBetween(#[serde(deserialize_with = "exactly_points")] [[f32; 2]; 2]),
     /// Attack the other side's units, wherever they are.
     Hunt,
 }
@@ -160,6 +177,8 @@ pub struct Scenario {
     pub enemy_order: EnemyOrder,
     /// Middle of the enemies' places, which formations are relative to.
     pub enemy_centre: [f32; 2],
+    /// Groups of allies and of enemies, as they were written.
+    pub armies: [Vec<Group>; 2],
     /// Races of allies and enemies.
     pub races: [Race; 2],
     /// The game's numbers of the types, as `field.profiles`.
@@ -237,9 +256,22 @@ impl Scenario {
             enemy_centre: [middle(0), middle(1)],
             recruits: allies.into_iter().chain(enemies).collect(),
             enemy_order: file.enemies.order,
+            armies: [file.allies.groups.clone(), file.enemies.groups.clone()],
             races: [file.allies.race, file.enemies.race],
             type_ids: types.iter().map(|unit| unit.type_id).collect(),
         })
+    }
+
+    /// What SMAC calls a team of these types (`map_type`), if it has a name for it.
+    #[must_use]
+    pub fn map_type(&self) -> Option<&'static str> {
+        let mut kinds: Vec<&str> = self.recruits[..self.agents]
+            .iter()
+            .map(|agent| self.field.profiles[usize::from(agent.kind)].name.as_str())
+            .collect();
+        kinds.dedup();
+        let known = MAP_TYPES.iter().find(|(types, _)| *types == kinds);
+        known.map(|(_, name)| *name)
     }
 
     /// Number of enemies.
@@ -298,6 +330,23 @@ impl MapFile {
             EnemyOrder::AttackMoveBetween(ends) => ends.into_iter().try_for_each(check_point),
         }
     }
+}
+
+/// Reads a point. Arrays as such would be read up to their length, and what is written beyond it passed over.
+pub(super) fn exactly<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f32; 2], D::Error> {
+    pair(Vec::deserialize(deserializer)?, "numbers, [x, y]")
+}
+
+fn exactly_points<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[[f32; 2]; 2], D::Error> {
+    let points: Vec<Vec<f32>> = Vec::deserialize(deserializer)?;
+    let [from, to] = pair(points, "points, [[x, y], [x, y]]")?;
+    Ok([pair(from, "numbers, [x, y]")?, pair(to, "numbers, [x, y]")?])
+}
+
+fn pair<T, E: Error>(list: Vec<T>, of_what: &str) -> Result<[T; 2], E> {
+    let length = list.len();
+    let expected = || E::custom(format!("found an array of {length}, expected 2 {of_what}"));
+    list.try_into().map_err(|_| expected())
 }
 
 /// Mean of the groups' points, weighted by their sizes.

@@ -211,6 +211,52 @@ mod tests {
         settings.validate().unwrap_err();
     }
 
+    /// The arguments of `StarCraft2Env` that have a setting, with SMAC's default.
+    const OF_SMAC: &str = "
+        step_mul = 8
+        move_amount = 2.0
+        obs_all_health = true
+        obs_own_health = true
+        obs_last_action = false
+        obs_pathing_grid = false
+        obs_terrain_height = false
+        obs_instead_of_state = false
+        obs_timestep_number = false
+        state_last_action = true
+        state_timestep_number = false
+        reward_sparse = false
+        reward_only_positive = true
+        reward_death_value = 10.0
+        reward_win = 200.0
+        reward_defeat = 0.0
+        reward_negative_scale = 0.5
+        reward_scale = true
+        reward_scale_rate = 20.0";
+
+    #[test]
+    fn options_have_the_names_and_the_defaults_of_smac() {
+        let ours = toml::Table::try_from(SkirmishSettings::default()).unwrap();
+        let smac: toml::Table = toml::from_str(OF_SMAC).unwrap();
+        for (name, default) in &smac {
+            assert_eq!(ours.get(name), Some(default), "{name}");
+        }
+        // What SMAC has in its code, and what it has not.
+        let further = [
+            "compat",
+            "enemy_order",
+            "shoot_range",
+            "sight_range",
+            "spawn_scatter",
+            "units",
+        ];
+        let names: Vec<&str> = ours
+            .keys()
+            .map(String::as_str)
+            .filter(|name| !smac.contains_key(*name))
+            .collect();
+        assert_eq!(names, further);
+    }
+
     #[test]
     fn unknown_settings_are_refused() {
         toml::from_str::<SkirmishSettings>("sight_rang = 9.0").unwrap_err();

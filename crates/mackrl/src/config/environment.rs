@@ -79,6 +79,12 @@ impl EnvironmentConfig {
         (self.scenario.is_empty() && self.map.ends_with(".toml")).then_some(self.map.as_str())
     }
 
+    /// Whether the world is the matrix game, not a skirmish.
+    #[must_use]
+    pub fn is_matrix_game(&self) -> bool {
+        self.scenario.is_empty() && self.map == MATRIX_GAME
+    }
+
     /// Builds the world in the built-in simulator.
     ///
     /// # Errors
@@ -88,7 +94,7 @@ impl EnvironmentConfig {
             let message = "env.engine is `sc2`, but only the built-in simulator can be used here";
             return Err(Error::Config(message.to_owned()));
         }
-        if self.scenario.is_empty() && self.map == MATRIX_GAME {
+        if self.is_matrix_game() {
             return registry::make_matrix_game(self.matrix_game)
                 .map(|game| Box::new(game) as _)
                 .map_err(|error| Error::Config(error.to_string()));

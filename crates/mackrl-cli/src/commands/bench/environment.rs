@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::print_rows;
 use crate::{
-    args::{BenchEnvironmentArgs, with_scenario},
+    args::{BenchEnvironmentArgs, world},
     output,
 };
 
@@ -33,12 +33,15 @@ struct Player {
 }
 
 pub(super) fn run(args: &BenchEnvironmentArgs) -> anyhow::Result<()> {
-    let typed = format!("--map {}", args.map);
-    let layers = ConfigBuilder::new().flag(&typed, &format!("env.map={}", args.map))?;
-    let config = with_scenario(layers)?.build()?;
+    let world = world(
+        ConfigBuilder::new(),
+        &format!("--map {}", args.map),
+        &args.map,
+        &[],
+    )?;
     let players = (0..args.threads.get() as u64).map(|seed| {
         Ok(Player {
-            play: RandomPlay::new(config.env.make()?, seed),
+            play: RandomPlay::new(world.make()?, seed),
             outcome: Ok(()),
         })
     });

@@ -1,8 +1,8 @@
 //! `mackrl play`: scripted teams, one episode or many.
 
+mod report;
 mod statistics;
 
-use anyhow::Context;
 use mackrl::{
     config::{ConfigBuilder, Engine, EnvironmentConfig},
     replay::record_script,
@@ -10,13 +10,14 @@ use mackrl::{
 use mackrl_env::{EpisodeKey, Stream, registry};
 
 use crate::{
-    args::{PlayArgs, with_scenario},
+    args::{PlayArgs, world},
     commands::sc2,
     failure::Failure,
     output,
     replay::{Opened, Summary},
     reproduce::Meter,
 };
+use report::Report;
 use statistics::{Row, play_many};
 
 /// The word that stands for every map.
@@ -55,19 +56,12 @@ fn maps(args: &PlayArgs) -> anyhow::Result<Vec<EnvironmentConfig>> {
         ALL => registry::map_names(),
         name => vec![name],
     };
-    names.into_iter().map(|name| map(args, name)).collect()
-}
-
-fn map(args: &PlayArgs, name: &str) -> anyhow::Result<EnvironmentConfig> {
-    let quoted = serde_json::to_string(name).context("a name is a string")?;
-    let typed = format!("--map {name}");
-    let mut builder = ConfigBuilder::new().flag(&typed, &format!("env.map={quoted}"))?;
-    let typed = format!("--env {}", args.env);
-    builder = builder.flag(&typed, &format!("env.engine={}", args.env))?;
-    for assignment in &args.set {
-        builder = builder.set(assignment)?;
-    }
-    Ok(with_scenario(builder)?.build()?.env)
+    let map = |name: &str| {
+        let typed = format!("--env {}", args.env);
+        let engine = ConfigBuilder::new().flag(&typed, &format!("env.engine={}", args.env))?;
+        world(engine, &format!("--map {name}"), name, &args.set)
+    };
+    names.into_iter().map(map).collect()
 }
 
 /// Plays many episodes of each map by each policy, and prints how they went.
@@ -76,6 +70,9 @@ fn many(
     maps: &[EnvironmentConfig],
     policies: &[mackrl_env::skirmish::scripted::ScriptedPolicy],
 ) -> anyhow::Result<()> {
+    if let Some(folder) = &args.out {
+        report::make_folder(folder)?;
+    }
     let meter = Meter::new("episodes");
     let each = usize::try_from(args.episodes.get()).unwrap_or(usize::MAX);
     let total = each.saturating_mul(maps.len() * policies.len());
@@ -95,6 +92,9 @@ fn many(
             )?;
             rows.push(summary);
         }
+    }
+    if let Some(folder) = &args.out {
+        Report::new(args.command(folder), &rows).write(folder)?;
     }
     match (&rows[..], args.json) {
         ([row], true) => output::print_json(row),

@@ -207,6 +207,26 @@ impl Row {
         }
     }
 
+    /// The map that was played.
+    pub(super) fn map(&self) -> &str {
+        &self.map
+    }
+
+    /// Who played.
+    pub(super) const fn policy(&self) -> &'static str {
+        self.policy
+    }
+
+    /// Share of battles won, with its error.
+    pub(super) fn won(&self) -> String {
+        with_error(self.battle_won_mean, self.battle_won_sem, 3)
+    }
+
+    /// Return of an episode, with its error.
+    pub(super) fn total(&self) -> String {
+        with_error(self.return_mean, self.return_sem, 2)
+    }
+
     /// One line for each row, under a heading.
     pub(super) fn table(rows: &[Self]) -> String {
         let heading = [
@@ -220,21 +240,22 @@ impl Row {
         ];
         let mut cells = vec![heading.map(str::to_owned).to_vec()];
         cells.extend(rows.iter().map(|row| {
-            let pair = |mean: f64, error: f64, digits: usize| {
-                format!("{mean:.digits$} ± {error:.digits$}")
-            };
             vec![
                 row.map.clone(),
                 row.policy.to_owned(),
-                pair(row.battle_won_mean, row.battle_won_sem, 3),
-                pair(row.return_mean, row.return_sem, 2),
-                pair(row.ep_length_mean, row.ep_length_sem, 1),
-                pair(row.dead_allies_mean, row.dead_allies_sem, 2),
-                pair(row.dead_enemies_mean, row.dead_enemies_sem, 2),
+                row.won(),
+                row.total(),
+                with_error(row.ep_length_mean, row.ep_length_sem, 1),
+                with_error(row.dead_allies_mean, row.dead_allies_sem, 2),
+                with_error(row.dead_enemies_mean, row.dead_enemies_sem, 2),
             ]
         }));
         output::table(&cells)
     }
+}
+
+fn with_error(mean: f64, error: f64, digits: usize) -> String {
+    format!("{mean:.digits$} ± {error:.digits$}")
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@
 mod drawing;
 mod places;
 mod types;
+mod words;
 
 use std::{fmt, sync::Arc};
 
@@ -17,7 +18,7 @@ use crate::{
     EntitySet,
     skirmish::{
         Scenario,
-        scenario::{Allies, Enemies, EnemyOrder, Group, MapFile},
+        scenario::{Allies, Enemies, EnemyOrder, Group, MapFile, exactly},
         terrain::{MAP_SIZE, Terrain, TerrainName},
         unit_types::UnitTypes,
     },
@@ -82,6 +83,7 @@ struct EnemyArmy {
 struct Squad {
     unit: String,
     count: i64,
+    #[serde(deserialize_with = "exactly")]
     at: [f32; 2],
 }
 
@@ -179,9 +181,11 @@ fn terrain(text: &str) -> Result<Arc<Terrain>, Broken> {
     named.map(Terrain::named).map_err(|error| {
         let names = error.message().split_once("expected ");
         let names = names.map_or_else(String::new, |(_, names)| names.to_owned());
+        let meant = words::nearest(text, names.split('`').skip(1).step_by(2));
         let message = format!(
-            "terrain `{}` is unknown, expected {names}, or a drawing of {MAP_SIZE} lines",
-            shortened(text)
+            "terrain `{}` is unknown, expected {names}, or a drawing of {MAP_SIZE} lines{}",
+            shortened(text),
+            in_question(meant)
         );
         (path, message)
     })
@@ -247,6 +251,11 @@ fn check_point(point: [f32; 2], path: &Path) -> Result<(), Broken> {
     }
     let message = format!("the point is {point:?}, expected coordinates in [0, {edge}]");
     Err((path.clone(), message))
+}
+
+/// The end of a message about a name that may be a misspelling.
+fn in_question(meant: Option<&str>) -> String {
+    meant.map_or_else(String::new, |name| format!(", did you mean `{name}`?"))
 }
 
 /// The beginning of a text that may be long.

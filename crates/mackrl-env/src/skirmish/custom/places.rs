@@ -2,12 +2,13 @@
 
 use std::ops::Range;
 
+use serde_path_to_error::Segment;
 use toml::{
     Spanned,
     de::{DeTable, DeValue},
 };
 
-use super::ScenarioProblem;
+use super::{ScenarioProblem, words::plain};
 
 /// Keys and positions that lead from the document to a value.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -28,6 +29,18 @@ impl Path {
     /// The value of a key of this table.
     pub(super) fn field(mut self, name: &str) -> Self {
         self.0.push(Part::Field(name.to_owned()));
+        self
+    }
+
+    /// The value that a reader of this value stumbled over.
+    pub(super) fn down_to(mut self, stumble: &serde_path_to_error::Path) -> Self {
+        for segment in stumble {
+            self = match segment {
+                Segment::Map { key } | Segment::Enum { variant: key } => self.field(key),
+                Segment::Seq { index } => self.item(*index),
+                Segment::Unknown => break,
+            };
+        }
         self
     }
 
@@ -90,7 +103,7 @@ fn field<'t, 'a>(table: &'t DeTable<'a>, name: &str) -> Option<&'t Spanned<DeVal
 
 fn problem_of(text: &str, error: &toml::de::Error) -> ScenarioProblem {
     let at = error.span().map_or(0, |span| span.start);
-    problem_at(text, at, error.message().replace('\n', ", "))
+    problem_at(text, at, plain(error.message()))
 }
 
 fn problem_at(text: &str, at: usize, message: String) -> ScenarioProblem {

@@ -70,7 +70,7 @@ fn a_problem_names_line_column_found_and_expected() {
     assert!(
         problem("count = 8", "count = 2000000000000").contains("expected an integer in [1, 100]")
     );
-    assert!(problem("count = 8", "count = \"eight\"").contains("expected i64"));
+    assert!(problem("count = 8", "count = \"eight\"").contains("expected an integer"));
     assert!(problem("at = [26, 16]", "at = [26, inf]").contains("expected coordinates in [0, 32]"));
     assert!(problem("at = [26, 16]", "at = [0, 0]").contains("where nobody can stand"));
     assert!(problem("####\n", "###x\n").contains("expected `.` (walkable) or `#` (wall)"));
@@ -78,9 +78,89 @@ fn a_problem_names_line_column_found_and_expected() {
 }
 
 #[test]
+fn a_problem_within_a_unit_type_is_found_where_it_was_written() {
+    let place = |from: &str| {
+        let line = EXAMPLE.lines().position(|line| line.starts_with(from));
+        line.expect("a line of the example") + 1
+    };
+    let damage = place("damage = 18");
+    assert_eq!(
+        problem("damage = 18", "damage = \"much\""),
+        format!("{damage}:10: found string \"much\", expected a number")
+    );
+    let misspelt = problem("damage = 18", "damge = 18");
+    assert!(
+        misspelt.starts_with(&format!("{damage}:9: unknown field `damge`"))
+            && misspelt.ends_with("did you mean `damage`?"),
+        "{misspelt}"
+    );
+    let delivery = problem("damage = 18", "delivery = { misile = { speed = 9 } }");
+    assert!(
+        delivery.starts_with(&format!("{damage}:12: unknown variant `misile`")),
+        "{delivery}"
+    );
+    let missing = problem("like = \"marine\" ", "# ");
+    assert!(missing.ends_with("and what differs"), "{missing}");
+}
+
+#[test]
+fn types_can_have_any_kind_of_weapon() {
+    for delivery in [
+        "{ missile = { speed = 18.75 } }",
+        "{ burst = { radius = 2.2, structure_damage = 80 } }",
+        "{ sweep = { half_width = 1.25, spacing = 0.25, radius = 0.15, interval_s = 0.03, delay_s = 0.25, target_delay_s = 0.4 } }",
+    ] {
+        let weapon = format!("damage = 18\nhits = 2\ndelivery = {delivery}");
+        play(read(&EXAMPLE.replacen("damage = 18", &weapon, 1)).unwrap());
+    }
+    let slow = problem("damage = 18", "delivery = { missile = { speed = 0.5 } }");
+    assert!(
+        slow.ends_with("speed is 0.5, expected a number in [1, 1000]"),
+        "{slow}"
+    );
+}
+
+#[test]
+fn a_name_that_is_misspelt_is_answered_with_the_nearest() {
+    for (from, to, meant) in [
+        ("unit = \"zergling\"", "unit = \"zerglin\"", "zergling"),
+        ("like = \"marine\"", "like = \"marin\"", "marine"),
+        ("race = \"zerg\"", "race = \"Zerg\"", "zerg"),
+        ("episode_limit", "episode_limt", "episode_limit"),
+        ("{ attack-move =", "{ atack-move =", "attack-move"),
+    ] {
+        let message = problem(from, to);
+        let question = format!("did you mean `{meant}`?");
+        assert!(message.ends_with(&question), "{message}");
+    }
+}
+
+#[test]
+fn a_point_has_two_coordinates() {
+    for (from, to) in [
+        ("at = [26, 16]", "at = [26, 16, 3]"),
+        ("at = [26, 16]", "at = [26]"),
+        ("attack-move = [8, 16]", "attack-move = [8, 16, 24]"),
+        (
+            "attack-move = [8, 16]",
+            "attack-move-between = [[8, 16], [1, 2, 3]]",
+        ),
+        ("attack-move = [8, 16]", "attack-move-between = [[8, 16]]"),
+    ] {
+        let message = problem(from, to);
+        assert!(message.contains("found an array of"), "{to}: {message}");
+    }
+}
+
+#[test]
 fn text_that_nests_or_repeats_without_end_is_refused() {
-    let deep = format!("a = {}", "[".repeat(100_000));
-    read(&deep).unwrap_err();
+    for deep in ["[", "{a="] {
+        let deep = format!("a = {}", deep.repeat(80_000));
+        assert!(
+            read(&deep).unwrap_err().message.contains("nest too deeply"),
+            "{deep:.9}"
+        );
+    }
     let long = "#".repeat(LENGTH_MAX + 1);
     assert!(
         read(&long)

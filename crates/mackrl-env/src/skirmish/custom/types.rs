@@ -1,9 +1,13 @@
 //! Unit types of a scenario: new ones, or shipped ones with some numbers changed.
 
-use serde::Deserialize;
 use toml::{Table, Value};
 
-use super::{Broken, places::Path, shortened};
+use super::{
+    Broken, in_question,
+    places::Path,
+    shortened,
+    words::{nearest, plain},
+};
 use crate::skirmish::unit_types::{UnitType, UnitTypes};
 
 /// Most types that a scenario may define.
@@ -12,17 +16,25 @@ const TYPES_MAX: usize = 32;
 const NAME_MAX: usize = 40;
 /// Longest array within a type.
 const ARRAY_MAX: usize = 8;
-/// Ranges of numbers that have a tighter one than [`ANY_NUMBER`]: the name of the field, the least and the greatest value.
-const RANGES: [(&str, f64, f64); 9] = [
-    ("life", 1.0, 1e5),
-    ("speed", 0.0, 4.0),
-    ("radius", 0.0, 2.0),
-    ("separation_radius", 0.0625, 2.0),
-    ("inner_radius", 0.0, 1.0),
-    ("range", 0.0, 32.0),
-    ("period_s", 0.125, 120.0),
-    ("hits", 1.0, 8.0),
-    ("type_id", 0.0, 1e6),
+/// The table of a unit type, which has no name of its own.
+const UNIT: &str = "unit";
+/// Ranges of numbers that have a tighter one than [`ANY_NUMBER`]: the table, the field, the least and the greatest value.
+const RANGES: [(&str, &str, f64, f64); 15] = [
+    (UNIT, "life", 1.0, 1e5),
+    (UNIT, "speed", 0.0, 4.0),
+    (UNIT, "radius", 0.0, 2.0),
+    (UNIT, "separation_radius", 0.0625, 2.0),
+    (UNIT, "inner_radius", 0.0, 1.0),
+    (UNIT, "type_id", 0.0, 1e6),
+    ("weapon", "range", 0.0, 32.0),
+    ("weapon", "range_slop", 0.0, 32.0),
+    ("weapon", "period_s", 0.125, 120.0),
+    ("weapon", "hits", 1.0, 8.0),
+    ("heal", "range", 0.0, 32.0),
+    ("missile", "speed", 1.0, 1000.0),
+    ("burst", "radius", 0.0, 16.0),
+    ("sweep", "spacing", 0.05, 16.0),
+    ("sweep", "half_width", 0.0, 16.0),
 ];
 /// Range of all other numbers.
 const ANY_NUMBER: (f64, f64) = (0.0, 1e5);
@@ -50,9 +62,10 @@ pub(super) fn extended(units: &UnitTypes, tables: &[Table]) -> Result<UnitTypes,
 pub(super) fn unknown(name: &str, units: &UnitTypes) -> String {
     let names: Vec<&str> = units.types.iter().map(|unit| unit.name.as_str()).collect();
     format!(
-        "unit `{}` is unknown, expected one of {}",
+        "unit `{}` is unknown, expected one of {}{}",
         shortened(name),
-        names.join(", ")
+        names.join(", "),
+        in_question(nearest(name, names.iter().copied()))
     )
 }
 
@@ -71,13 +84,16 @@ fn unit_type(units: &UnitTypes, table: &Table, path: &Path) -> Result<UnitType, 
             .ok_or_else(|| (path, unknown(name, units)))?;
         merged = Table::try_from(model).map_err(|error| broken(error.to_string()))?;
     }
-    check_numbers(&own, path)?;
+    check_numbers(UNIT, &own, path)?;
     lay(&mut merged, own);
-    let unit = UnitType::deserialize(merged).map_err(|error| {
-        let message = error.message().replace('\n', ", ");
-        broken(format!(
-            "{message}; a unit states every statistic, or `like = \"marine\"` and what differs"
-        ))
+    let unit: UnitType = serde_path_to_error::deserialize(merged).map_err(|error| {
+        let message = plain(error.inner().message());
+        let advice = if message.starts_with("missing field") {
+            "; a unit states every statistic, or `like = \"marine\"` and what differs"
+        } else {
+            ""
+        };
+        (path.clone().down_to(error.path()), message + advice)
     })?;
     if !(1..=NAME_MAX).contains(&unit.name.chars().count()) {
         let message = format!(
@@ -105,18 +121,18 @@ fn lay(under: &mut Table, over: Table) {
 }
 
 /// Checks that every number of a type is in its range, whatever statistics there are.
-fn check_numbers(table: &Table, path: &Path) -> Result<(), Broken> {
+fn check_numbers(name: &str, table: &Table, path: &Path) -> Result<(), Broken> {
     for (key, value) in table {
-        check_value(key, value, path.clone().field(key))?;
+        check_value((name, key), value, path.clone().field(key))?;
     }
     Ok(())
 }
 
-fn check_value(key: &str, value: &Value, path: Path) -> Result<(), Broken> {
+fn check_value((table, key): (&str, &str), value: &Value, path: Path) -> Result<(), Broken> {
     let number = match value {
         Value::Integer(number) => *number as f64,
         Value::Float(number) => *number,
-        Value::Table(table) => return check_numbers(table, &path),
+        Value::Table(inner) => return check_numbers(key, inner, &path),
         Value::Array(array) if array.len() > ARRAY_MAX => {
             let message = format!(
                 "{key} has {} elements, expected at most {ARRAY_MAX}",
@@ -126,14 +142,16 @@ fn check_value(key: &str, value: &Value, path: Path) -> Result<(), Broken> {
         }
         Value::Array(array) => {
             let items = array.iter().enumerate();
-            return items
-                .into_iter()
-                .try_for_each(|(index, item)| check_value(key, item, path.clone().item(index)));
+            return items.into_iter().try_for_each(|(index, item)| {
+                check_value((table, key), item, path.clone().item(index))
+            });
         }
         Value::String(_) | Value::Boolean(_) | Value::Datetime(_) => return Ok(()),
     };
-    let tighter = RANGES.iter().find(|(name, ..)| *name == key);
-    let (least, greatest) = tighter.map_or(ANY_NUMBER, |(_, least, greatest)| (*least, *greatest));
+    let tighter = RANGES
+        .iter()
+        .find(|(of, name, ..)| (*of, *name) == (table, key));
+    let (least, greatest) = tighter.map_or(ANY_NUMBER, |(.., least, greatest)| (*least, *greatest));
     if (least..=greatest).contains(&number) {
         return Ok(());
     }

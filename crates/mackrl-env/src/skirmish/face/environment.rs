@@ -8,7 +8,10 @@ use crate::{
     skirmish::{
         Encounter,
         error::SkirmishError,
-        face::view::{BattleTally, Face},
+        face::{
+            layout::Layout,
+            view::{BattleTally, Face},
+        },
         rules::{Battle, Chance, UnitIndex},
         scenario::Scenario,
         settings::SkirmishSettings,
@@ -43,6 +46,18 @@ impl Skirmish {
     #[must_use]
     pub fn battle(&self) -> &Battle {
         self.encounter.battle()
+    }
+
+    /// Sizes of what agents and critics are shown.
+    #[must_use]
+    pub fn layout(&self) -> &Layout {
+        self.face.layout()
+    }
+
+    /// The greatest return before scaling: the enemies' life and shields, their deaths, and the victory.
+    #[must_use]
+    pub fn max_reward(&self) -> f32 {
+        self.face.max_reward()
     }
 
     /// The map.

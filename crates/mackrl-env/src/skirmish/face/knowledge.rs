@@ -5,7 +5,9 @@ use std::sync::Arc;
 use crate::{
     Action, AgentId, EntityId, KnownEntities, PriorKnowledge,
     skirmish::{
-        face::layout::TARGET_ACTIONS_FROM, scenario::Scenario, settings::SkirmishSettings,
+        actions::{DIRECTIONS, MOVES_FROM, STOP, TARGETS_FROM},
+        scenario::Scenario,
+        settings::SkirmishSettings,
         terrain::Terrain,
     },
 };
@@ -116,15 +118,12 @@ impl SkirmishKnowledge {
     /// with coordinates truncated towards zero.
     #[must_use]
     pub fn moves(&self, x: f32, y: f32) -> [bool; 4] {
-        let (x, y) = (f64::from(x), f64::from(y));
         let ahead = self.move_ahead;
-        [
-            (x, y + ahead),
-            (x, y - ahead),
-            (x + ahead, y),
-            (x - ahead, y),
-        ]
-        .map(|(x, y)| self.terrain.is_walkable(truncated(x), truncated(y)))
+        DIRECTIONS.map(|[dx, dy]| {
+            let x = f64::from(x) + f64::from(dx) * ahead;
+            let y = f64::from(y) + f64::from(dy) * ahead;
+            self.terrain.is_walkable(truncated(x), truncated(y))
+        })
     }
 }
 
@@ -143,9 +142,9 @@ impl PriorKnowledge for SkirmishKnowledge {
     fn available(&self, known: KnownEntities<'_>, agent: AgentId, available_a: &mut [bool]) {
         available_a.fill(false);
         let Some(own) = known.get(agent) else { return };
-        available_a[1] = true;
-        available_a[2..TARGET_ACTIONS_FROM].copy_from_slice(&self.moves(own[0], own[1]));
-        for (target, available) in available_a[TARGET_ACTIONS_FROM..].iter_mut().enumerate() {
+        available_a[STOP] = true;
+        available_a[MOVES_FROM..TARGETS_FROM].copy_from_slice(&self.moves(own[0], own[1]));
+        for (target, available) in available_a[TARGETS_FROM..].iter_mut().enumerate() {
             *available = self
                 .target(agent.index(), target)
                 .and_then(|target| known.get(EntityId::new(target)))
@@ -155,7 +154,7 @@ impl PriorKnowledge for SkirmishKnowledge {
 
     fn action_on(&self, entity: EntityId) -> Option<Action> {
         let enemy = entity.index().checked_sub(self.agents)?;
-        Some(Action::new(TARGET_ACTIONS_FROM + enemy))
+        Some(Action::new(TARGETS_FROM + enemy))
     }
 }
 

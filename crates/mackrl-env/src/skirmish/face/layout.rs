@@ -3,27 +3,28 @@
 use crate::{
     EnvironmentSpec,
     skirmish::{
+        actions::{DIRECTIONS, TARGETS_FROM},
         rules::Team,
         scenario::{Race, Scenario},
         settings::{Compatibility, SkirmishSettings},
     },
 };
 
-/// Actions before the first target: no-op, stop, north, south, east, west.
-pub(super) const TARGET_ACTIONS_FROM: usize = 6;
-
-/// Sizes and positions of all that agents and critics are shown.
+/// Sizes and positions of all that agents and critics are shown: what SMAC's `get_obs_enemy_feats_size` and the like tell.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Layout {
-    pub(super) agents: usize,
-    pub(super) enemies: usize,
-    pub(super) actions: usize,
+pub struct Layout {
+    /// N: agents.
+    pub agents: usize,
+    /// Their enemies.
+    pub enemies: usize,
+    /// A: actions of an agent.
+    pub actions: usize,
     /// 1 if allies are observed with shields, else 0.
-    pub(super) ally_shields: usize,
+    pub ally_shields: usize,
     /// 1 if enemies are observed with shields, else 0.
-    pub(super) enemy_shields: usize,
+    pub enemy_shields: usize,
     /// Length of SMAC's one-hot of types: 0 if the allies are all of one type.
-    pub(super) type_bits: usize,
+    pub type_bits: usize,
     /// Per kind: its place in the one-hot of an ally, if allies have such units.
     pub(super) ally_type: Vec<Option<usize>>,
     /// Per kind: its place in the one-hot of an enemy.
@@ -78,7 +79,7 @@ impl Layout {
         Self {
             agents: scenario.agents,
             enemies: scenario.enemies(),
-            actions: TARGET_ACTIONS_FROM + scenario.enemies(),
+            actions: TARGETS_FROM + scenario.enemies(),
             ally_shields: usize::from(scenario.races[0] == Race::Protoss),
             enemy_shields: usize::from(scenario.races[1] == Race::Protoss),
             type_bits,
@@ -102,8 +103,17 @@ impl Layout {
         }
     }
 
+    /// \[move available north, south, east, west, (walkable around), (heights around)\].
+    #[must_use]
+    pub fn move_row(&self) -> usize {
+        let pathing = if self.obs_pathing_grid { 8 } else { 0 };
+        let heights = if self.obs_terrain_height { 9 } else { 0 };
+        DIRECTIONS.len() + pathing + heights
+    }
+
     /// \[attackable, distance, x, y, (life, (shield)), (type)\].
-    pub(super) fn enemy_row(&self) -> usize {
+    #[must_use]
+    pub fn enemy_row(&self) -> usize {
         4 + self.health(self.enemy_shields) + self.type_bits
     }
 
@@ -113,7 +123,8 @@ impl Layout {
     }
 
     /// \[visible, distance, x, y, (life, (shield)), (type), (last action)\].
-    pub(super) fn ally_row(&self) -> usize {
+    #[must_use]
+    pub fn ally_row(&self) -> usize {
         let last_action = if self.obs_last_action {
             self.actions
         } else {
@@ -123,7 +134,8 @@ impl Layout {
     }
 
     /// \[(life, (shield)), (type)\].
-    pub(super) fn own_row(&self) -> usize {
+    #[must_use]
+    pub fn own_row(&self) -> usize {
         let health = if self.obs_own_health {
             1 + self.ally_shields
         } else {
@@ -132,13 +144,10 @@ impl Layout {
         health + self.type_bits
     }
 
-    pub(super) fn observation_size(&self) -> usize {
-        let moves = 4;
-        let pathing = if self.obs_pathing_grid { 8 } else { 0 };
-        let heights = if self.obs_terrain_height { 9 } else { 0 };
-        moves
-            + pathing
-            + heights
+    /// O: moves, enemies, allies, the agent itself, the time if shown.
+    #[must_use]
+    pub fn observation_size(&self) -> usize {
+        self.move_row()
             + usize::from(self.obs_timestep_number)
             + self.enemies * self.enemy_row()
             + (self.agents - 1) * self.ally_row()
@@ -146,27 +155,36 @@ impl Layout {
     }
 
     /// \[life, cooldown, x, y, (shield), (type)\].
-    pub(super) fn state_ally_row(&self) -> usize {
+    #[must_use]
+    pub fn state_ally_row(&self) -> usize {
         4 + self.ally_shields + self.type_bits
     }
 
     /// \[life, x, y, (shield), (type)\].
-    pub(super) fn state_enemy_row(&self) -> usize {
+    #[must_use]
+    pub fn state_enemy_row(&self) -> usize {
         3 + self.enemy_shields + self.type_bits
     }
 
-    pub(super) fn state_size(&self) -> usize {
+    /// One-hot of an agent's last action, if the state holds it.
+    #[must_use]
+    pub fn state_last_action_row(&self) -> usize {
+        if self.state_last_action {
+            self.actions
+        } else {
+            0
+        }
+    }
+
+    /// G.
+    #[must_use]
+    pub fn state_size(&self) -> usize {
         if self.obs_instead_of_state {
             return self.agents * self.observation_size();
         }
-        let last_actions = if self.state_last_action {
-            self.agents * self.actions
-        } else {
-            0
-        };
         self.agents * self.state_ally_row()
             + self.enemies * self.state_enemy_row()
-            + last_actions
+            + self.agents * self.state_last_action_row()
             + usize::from(self.state_timestep_number)
     }
 

@@ -10,6 +10,7 @@ mod view;
 
 pub use environment::Skirmish;
 pub use knowledge::SkirmishKnowledge;
+pub use layout::Layout;
 pub use view::{BattleTally, Face};
 
 #[cfg(test)]

@@ -3,10 +3,8 @@
 use crate::{
     Action, EntitySet, ObservationMut,
     skirmish::{
-        face::{
-            knowledge::SkirmishKnowledge,
-            layout::{Layout, TARGET_ACTIONS_FROM},
-        },
+        actions::{MOVES_FROM, NO_OPERATION, STOP, TARGETS_FROM},
+        face::{knowledge::SkirmishKnowledge, layout::Layout},
         rules::{BattleState, Battlefield, Profile, Unit},
     },
 };
@@ -70,15 +68,15 @@ impl Scene<'_> {
     pub(super) fn is_available(&self, agent: usize, action: usize) -> bool {
         let state = self.state;
         if !state.units[agent].is_alive() {
-            return action == 0;
+            return action == NO_OPERATION;
         }
         let (x, y) = (state.x[agent], state.y[agent]);
         match action {
-            0 => false,
-            1 => true,
-            2..TARGET_ACTIONS_FROM => self.knowledge.moves(x, y)[action - 2],
+            NO_OPERATION => false,
+            STOP => true,
+            MOVES_FROM..TARGETS_FROM => self.knowledge.moves(x, y)[action - MOVES_FROM],
             _ => {
-                let target = action - TARGET_ACTIONS_FROM;
+                let target = action - TARGETS_FROM;
                 target < self.layout.enemies && self.can_aim(agent, target)
             }
         }
@@ -145,12 +143,12 @@ impl Scene<'_> {
         };
         if !own.is_alive() {
             observation_o.fill(0.0);
-            available_a[0] = true;
+            available_a[NO_OPERATION] = true;
             return EntitySet::EMPTY;
         }
         let moves = self.knowledge.moves(state.x[agent], state.y[agent]);
-        available_a[1] = true;
-        available_a[2..TARGET_ACTIONS_FROM].copy_from_slice(&moves);
+        available_a[STOP] = true;
+        available_a[MOVES_FROM..TARGETS_FROM].copy_from_slice(&moves);
         let mut seen = 1_u128 << agent;
         let mut row = Cursor(observation_o);
         for is_possible in moves {
@@ -163,7 +161,7 @@ impl Scene<'_> {
             // SMAC shows a healer, beside each enemy, whether the action of that number is available.
             let can_heal = heals.then(|| self.can_aim(agent, enemy));
             let can_shoot = self.write_enemy((agent, index), can_heal, &mut row, &mut seen);
-            available_a[TARGET_ACTIONS_FROM + enemy] = can_heal.unwrap_or(can_shoot);
+            available_a[TARGETS_FROM + enemy] = can_heal.unwrap_or(can_shoot);
         }
         for ally in (0..self.layout.agents).filter(|ally| *ally != agent) {
             self.write_ally(agent, ally, &mut row, &mut seen);

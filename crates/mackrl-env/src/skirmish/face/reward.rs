@@ -22,6 +22,8 @@ pub(super) enum Outcome {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Rewards {
     agents: usize,
+    /// The greatest return before scaling.
+    greatest: f32,
     /// What raw rewards are divided by.
     scale: f32,
     /// Life and shield of every unit before the step; 0 if dead.
@@ -37,6 +39,7 @@ impl Rewards {
             toughness + settings.reward_death_value * enemies.len() as f32 + settings.reward_win;
         let mut rewards = Self {
             agents,
+            greatest,
             scale: if settings.reward_scale {
                 greatest / settings.reward_scale_rate
             } else {
@@ -46,6 +49,11 @@ impl Rewards {
         };
         rewards.remember(state);
         rewards
+    }
+
+    /// The greatest return before scaling.
+    pub(super) const fn greatest(&self) -> f32 {
+        self.greatest
     }
 
     /// Takes `state` as the one before the next step.

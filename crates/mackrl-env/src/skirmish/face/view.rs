@@ -10,10 +10,11 @@ use crate::{
     Action, AgentId, EnvironmentSpec, EpisodeEnd, EpisodeStatistics, IllegalAction, ObservationMut,
     TimeStep,
     skirmish::{
+        actions::{DIRECTIONS, MOVES_FROM, NO_OPERATION, STOP, TARGETS_FROM},
         error::SkirmishError,
         face::{
             knowledge::SkirmishKnowledge,
-            layout::{Layout, TARGET_ACTIONS_FROM},
+            layout::Layout,
             observation::Scene,
             reward::{Outcome, Rewards},
             state_vector::cooldown_scale,
@@ -96,6 +97,18 @@ impl Face {
         &self.spec
     }
 
+    /// Sizes of what agents and critics are shown.
+    #[must_use]
+    pub const fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// The greatest return before scaling.
+    #[must_use]
+    pub const fn max_reward(&self) -> f32 {
+        self.rewards.greatest()
+    }
+
     /// What agents know before the battle.
     #[must_use]
     pub const fn knowledge(&self) -> &Arc<SkirmishKnowledge> {
@@ -170,16 +183,18 @@ impl Face {
         let (x, y) = (state.x[agent], state.y[agent]);
         let far = self.settings.move_amount;
         Some(match action.index() {
-            0 => return None,
-            1 => Order::Stop,
-            2 => Order::Move { to: [x, y + far] },
-            3 => Order::Move { to: [x, y - far] },
-            4 => Order::Move { to: [x + far, y] },
-            5 => Order::Move { to: [x - far, y] },
+            NO_OPERATION => return None,
+            STOP => Order::Stop,
+            direction @ MOVES_FROM..TARGETS_FROM => {
+                let [dx, dy] = DIRECTIONS[direction - MOVES_FROM];
+                Order::Move {
+                    to: [x + dx * far, y + dy * far],
+                }
+            }
             target => {
                 let target = self
                     .knowledge
-                    .target(agent, target - TARGET_ACTIONS_FROM)
+                    .target(agent, target - TARGETS_FROM)
                     .and_then(|target| UnitIndex::try_from(target).ok())
                     .expect("actions are checked to be available");
                 if self.knowledge.is_healer(agent) {

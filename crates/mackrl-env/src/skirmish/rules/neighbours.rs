@@ -15,6 +15,15 @@ const SKIN: f32 = 2.0;
 /// stride and 2 · 0.1 for pushes, so that it is within half the skin of where it was listed.
 const RENEW_AT: f32 = 0.5;
 
+/// Who can be in whose way: those of the same plane.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+enum Plane {
+    #[default]
+    Gone,
+    Ground,
+    High,
+}
+
 /// Lists of near units, one behind the other.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Neighbours {
@@ -27,20 +36,21 @@ pub(super) struct Neighbours {
     listed_y: Vec<f32>,
     radius: Vec<f32>,
     is_enemy: Vec<bool>,
-    is_on_ground: Vec<bool>,
+    /// Per unit: where it is in others' way. The dead are in nobody's.
+    plane: Vec<Plane>,
     is_valid: bool,
 }
 
 impl Neighbours {
     pub(super) fn reserve(&mut self, units: usize) {
-        make_room(&mut self.list, units * units);
+        self.list.resize(units * units, 0);
         make_room(&mut self.begin, units + 1);
         make_room(&mut self.middle, units);
         self.listed_x.resize(units, 0.0);
         self.listed_y.resize(units, 0.0);
         self.radius.resize(units, 0.0);
         self.is_enemy.resize(units, false);
-        self.is_on_ground.resize(units, true);
+        self.plane.resize(units, Plane::Gone);
         self.is_valid = false;
     }
 
@@ -85,41 +95,49 @@ impl Neighbours {
         for (index, unit) in state.units.iter().enumerate() {
             let profile = &field.profiles[usize::from(unit.kind)];
             self.radius[index] = profile.separation_radius;
-            self.is_on_ground[index] = profile.layer == Layer::Ground;
+            self.plane[index] = match profile.layer {
+                _ if !unit.is_alive() => Plane::Gone,
+                Layer::Ground => Plane::Ground,
+                Layer::Tall | Layer::Air => Plane::High,
+            };
             self.is_enemy[index] = unit.team == crate::skirmish::rules::Team::Enemy;
         }
-        self.list.clear();
         self.begin.clear();
         self.middle.clear();
+        let mut end = 0;
         for index in 0..state.units.len() {
-            self.begin.push(short(self.list.len()));
-            self.list_range(state, index, 0..index);
-            self.middle.push(short(self.list.len()));
-            self.list_range(state, index, index + 1..state.units.len());
+            self.begin.push(short(end));
+            end = self.list_range(index, 0..index, end);
+            self.middle.push(short(end));
+            end = self.list_range(index, index + 1..state.units.len(), end);
         }
-        self.begin.push(short(self.list.len()));
+        self.begin.push(short(end));
     }
 
-    fn list_range(&mut self, state: &BattleState, index: usize, range: std::ops::Range<usize>) {
-        if !state.units[index].is_alive() {
-            return;
+    /// Lists those of `range` that are near `index` from place `end` on; returns where their list ends.
+    ///
+    /// Everybody is written, and the place moves on only past those who are near: a branch that cannot be foreseen would cost
+    /// more than the writing.
+    fn list_range(&mut self, index: usize, range: std::ops::Range<usize>, mut end: usize) -> usize {
+        let plane = self.plane[index];
+        if plane == Plane::Gone || range.is_empty() {
+            return end;
         }
-        let (x, y, reach) = (
-            state.x[index],
-            state.y[index],
-            self.radius[index] + LOOKAHEAD + SKIN,
-        );
-        for other in range {
-            let (dx, dy) = (state.x[other] - x, state.y[other] - y);
-            let near = reach + self.radius[other];
-            if dx * dx + dy * dy < near * near
-                && state.units[other].is_alive()
-                && self.is_on_ground[index] == self.is_on_ground[other]
-            {
-                self.list
-                    .push(u8::try_from(other).expect("a battle has ≤ 256 units"));
-            }
+        let (x, y) = (self.listed_x[index], self.listed_y[index]);
+        let reach = self.radius[index] + LOOKAHEAD + SKIN;
+        let others = self.listed_x[range.clone()]
+            .iter()
+            .zip(&self.listed_y[range.clone()])
+            .zip(&self.radius[range.clone()])
+            .zip(&self.plane[range.clone()]);
+        for (other, (((other_x, other_y), radius), other_plane)) in range.zip(others) {
+            let (dx, dy) = (other_x - x, other_y - y);
+            let near = reach + radius;
+            let is_listed = (dx * dx + dy * dy < near * near) & (*other_plane == plane);
+            self.list[end] = u8::try_from(other).expect("a battle has ≤ 256 units");
+            end += usize::from(is_listed);
         }
+        end
     }
 }
 

@@ -13,13 +13,14 @@ use serde::{Deserialize, Serialize};
 use crate::{
     Action, AgentId, Draw, Environment, EnvironmentSpec, EpisodeKey, LocalView, Observations,
     PriorKnowledge,
-    skirmish::{Scenario, Skirmish, scenario::EnemyOrder},
+    skirmish::{
+        Scenario, Skirmish,
+        actions::{NO_OPERATION, STOP},
+        scenario::EnemyOrder,
+    },
 };
 use sight::{Foe, Sight};
 
-/// The actions whose numbers never differ.
-const NO_OPERATION: usize = 0;
-const STOP: usize = 1;
 /// Map units between an ally and an enemy within which they are taken to be fighting.
 const ENGAGED: f32 = 6.0;
 /// Map units to an enemy below which one that backs off does not stop to shoot.

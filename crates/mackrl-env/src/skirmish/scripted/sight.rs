@@ -2,11 +2,9 @@
 
 use crate::{
     Action, EntityId, LocalView, PriorKnowledge,
-    skirmish::{Scenario, scripted::walk::distance_squared},
+    skirmish::{Scenario, actions::TARGETS_FROM, scripted::walk::distance_squared},
 };
 
-/// Number of the first action with a target.
-const TARGET_ACTIONS_FROM: usize = 6;
 /// First features of an entity are its position; then come the shares of life and, where anybody has shields, of shields.
 const LIFE: usize = 2;
 const SHIELD: usize = 3;
@@ -152,7 +150,7 @@ fn heal_action(scenario: &Scenario, entity: EntityId) -> Option<usize> {
     let friend = entity.index();
     let profile = &scenario.field.profiles[usize::from(scenario.recruits[friend].kind)];
     let can_be_healed = profile.care.is_none() && friend < scenario.enemies();
-    can_be_healed.then_some(TARGET_ACTIONS_FROM + friend)
+    can_be_healed.then_some(TARGETS_FROM + friend)
 }
 
 /// Life and shield points of an entity with these features.

@@ -1,17 +1,11 @@
 //! Which of the four moves leads where a scripted agent wants to be.
 
 use crate::skirmish::{
+    actions::{DIRECTIONS, MOVES_FROM},
     scripted::sight::{Foe, Sight},
     terrain::{Terrain, cell_of},
 };
 
-/// North, south, east and west, and the action of each.
-const MOVES: [(usize, [f32; 2]); 4] = [
-    (2, [0.0, 1.0]),
-    (3, [0.0, -1.0]),
-    (4, [1.0, 0.0]),
-    (5, [-1.0, 0.0]),
-];
 /// Map units that a move is taken to go when its outcome is weighed.
 const STRIDE: f32 = 1.5;
 /// Map units at which a wall is too near to be comfortable, and how dangerous a wall on one side is taken to be.
@@ -26,8 +20,7 @@ pub(super) fn towards(sight: &Sight<'_>, goal: [f32; 2]) -> Option<usize> {
         let ahead = [0, 1].map(|axis| goal[axis] - sight.own[axis]);
         direction[0] * ahead[0] + direction[1] * ahead[1]
     };
-    let moves = MOVES.into_iter();
-    moves
+    moves()
         .filter(|(action, direction)| sight.available[*action] && gain(*direction) > 0.25)
         .max_by(|a, b| gain(a.1).total_cmp(&gain(b.1)))
         .map(|(action, _)| action)
@@ -53,7 +46,7 @@ pub(super) fn back_off(
     // The nearest counts most, but one does not flee from it into the others.
     let danger = |at: [f32; 2]| -> f32 {
         let squares = feared.iter().map(|foe| distance_squared(at, foe.at));
-        let walls = MOVES.iter().filter(|(_, direction)| {
+        let walls = DIRECTIONS.iter().filter(|direction| {
             let [x, y] = [0, 1].map(|axis| at[axis] + NEAR_WALL * direction[axis]);
             !terrain.is_walkable(cell_of(x.floor()), cell_of(y.floor()))
         });
@@ -61,13 +54,17 @@ pub(super) fn back_off(
             + WALL_DANGER * walls.count() as f32
     };
     let place = |direction: [f32; 2]| [0, 1].map(|axis| sight.own[axis] + STRIDE * direction[axis]);
-    let moves = MOVES.into_iter();
-    moves
+    moves()
         .filter(|(action, _)| sight.available[*action])
         .map(|(action, direction)| (action, danger(place(direction))))
         .filter(|(_, danger_there)| *danger_there < danger(sight.own))
         .min_by(|a, b| a.1.total_cmp(&b.1))
         .map(|(action, _)| action)
+}
+
+/// Every move with where it leads.
+fn moves() -> impl Iterator<Item = (usize, [f32; 2])> {
+    (MOVES_FROM..).zip(DIRECTIONS)
 }
 
 /// Square of the distance between two points.

@@ -5,7 +5,7 @@ use crate::{
     EpisodeKey, Stream,
     skirmish::{
         UnitData,
-        terrain::{Terrain, TerrainName},
+        terrain::{Terrain, TerrainName, cell_of},
         unit_types::{UnitType, UnitTypes},
     },
 };
@@ -16,8 +16,10 @@ mod healing;
 mod movement;
 mod reflexes;
 mod regeneration;
+mod rest;
 mod saving;
 mod symmetry;
+mod table;
 mod weapons;
 
 use Stance::{Aggressive, Passive};

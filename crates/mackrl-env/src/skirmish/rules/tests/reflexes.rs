@@ -116,3 +116,86 @@ fn hunters_find_their_prey_anywhere() {
     arena.battle.order(zergling, Order::Hunt);
     arena.loops_until(|state| !state.units[usize::from(marine)].is_alive());
 }
+
+#[test]
+fn a_unit_takes_the_nearest_target_whatever_its_type() {
+    for (near, far) in [
+        ("zergling", "marine"),
+        ("colossus", "zergling"),
+        ("medivac", "marine"),
+    ] {
+        let mut arena = Arena::new();
+        let marine = arena.add("marine", Enemy, Aggressive, [10.0, 16.0]);
+        arena.add(far, Ally, Passive, [14.0, 16.0]);
+        let nearest = arena.add(near, Ally, Passive, [10.0, 13.0]);
+        arena.loops(1);
+        assert_eq!(arena.unit(marine).quarry, Some(nearest), "{near} and {far}");
+    }
+}
+
+#[test]
+fn of_two_targets_equally_near_it_is_the_southern_one() {
+    let mut arena = Arena::new();
+    let marine = arena.add("marine", Enemy, Aggressive, [10.0, 16.0]);
+    arena.add("marine", Ally, Passive, [10.0, 19.0]);
+    let southern = arena.add("marine", Ally, Passive, [10.0, 13.0]);
+    arena.loops(1);
+    assert_eq!(arena.unit(marine).quarry, Some(southern));
+}
+
+#[test]
+fn a_unit_calls_for_help_every_two_seconds() {
+    let mut arena = Arena::new();
+    let victim = arena.add("spine-crawler", Enemy, Aggressive, [20.0, 16.0]);
+    let stalker = arena.add("stalker", Ally, Passive, [20.0, 7.5]);
+    arena.attack(stalker, victim);
+    arena.loops_until(|state| state.units[0].life < 300.0);
+    let called = arena.unit(victim).call_wait;
+    assert!(
+        (31.0..=32.0).contains(&called),
+        "{called} loops until the next call"
+    );
+    // A friend that comes later does not hear the hits in between.
+    let late = arena.add("zealot", Enemy, Aggressive, [20.0, 19.0]);
+    arena.loops_until(|state| state.units[0].life < 280.0);
+    assert_eq!(arena.unit(late).quarry, None, "23 loops after the call");
+    arena.loops_until(|state| state.units[0].life < 270.0);
+    assert_eq!(
+        arena.unit(late).quarry,
+        Some(stalker),
+        "46 loops after the call"
+    );
+}
+
+#[test]
+fn a_zergling_that_lost_its_quarry_takes_the_next_in_the_same_loop() {
+    let mut arena = Arena::new();
+    let zergling = arena.add("zergling", Enemy, Aggressive, [10.0, 16.0]);
+    let first = arena.add("marine", Ally, Passive, [10.7, 16.0]);
+    let second = arena.add("marine", Ally, Passive, [10.0, 18.0]);
+    arena.loops(2);
+    assert_eq!(arena.unit(zergling).quarry, Some(first));
+    arena.unit(first).life = 0.0;
+    arena.loops(1);
+    assert_eq!(arena.unit(zergling).quarry, Some(second));
+}
+
+#[test]
+fn banelings_of_an_army_run_into_their_targets_and_explode() {
+    let mut arena = Arena::new();
+    let baneling = arena.add("baneling", Enemy, Aggressive, [20.0, 16.0]);
+    let zealots: Vec<UnitIndex> = [15.2, 16.8]
+        .map(|y| arena.add("zealot", Ally, Passive, [14.0, y]))
+        .to_vec();
+    arena
+        .battle
+        .order(baneling, Order::AttackMove { to: [9.0, 16.0] });
+    arena.loops_until(|state| !state.units[0].is_alive());
+    for zealot in zealots {
+        assert_eq!(
+            arena.unit(zealot).shield,
+            15.0,
+            "20 and 15 more against the light"
+        );
+    }
+}

@@ -238,3 +238,35 @@ fn a_spine_crawler_strikes_the_armoured_harder_and_never_moves() {
     assert_eq!(arena.at(spine), [10.0, 16.0]);
     assert_eq!(arena.at(pusher), [14.0, 16.0], "round it");
 }
+
+#[test]
+fn missiles_fly_at_the_speed_of_their_data() {
+    for (name, speed) in [
+        ("marauder", 20.0),
+        ("stalker", 18.75),
+        ("hydralisk", 40.0_f32),
+    ] {
+        let (mut arena, _, marine) = duel(name, "marine", 5.5);
+        arena.loops_until(|state| !state.missiles.is_empty());
+        let flight = arena.loops_until(|state| state.units[usize::from(marine)].life < 45.0);
+        // To the target's edge, the first loop's flight already over.
+        let expected = ((5.5 - 0.375) / (speed / 16.0)).ceil() - 1.0;
+        assert_eq!(flight as f32, expected, "{name}");
+    }
+}
+
+#[test]
+fn a_weapon_reloads_while_its_unit_walks() {
+    let (mut arena, marine, other) = duel("marine", "zealot", 3.0);
+    arena.loops_until(|state| state.units[1].shield < 50.0);
+    arena.battle.order(marine, Order::Move { to: [9.0, 16.0] });
+    arena.loops(7);
+    assert!(
+        arena.at(marine)[0] < 9.1,
+        "another order ends the backswing"
+    );
+    arena.attack(marine, other);
+    // 13.77 loops from shot to shot, walking or not.
+    let loops = arena.loops_until(|state| state.units[1].shield < 44.0);
+    assert_eq!(7 + loops, 14);
+}

@@ -1,0 +1,80 @@
+//! `mackrl maps`: what can be played.
+
+mod card;
+mod row;
+
+use std::path::Path;
+
+use anyhow::Context;
+use mackrl::config::{ConfigBuilder, ConfigError};
+use mackrl_env::{
+    registry,
+    skirmish::{Skirmish, SkirmishSettings},
+};
+
+use crate::{
+    args::{MapsArgs, read_scenario, world},
+    output,
+};
+use card::Card;
+use row::Row;
+
+/// What the list does not hold: people who want "all maps" want SMAC's.
+const ALSO: &str = "\nBesides these, --map takes matrix-game, the game of the paper's Figure 5, and FILE.toml, a scenario of your own.\n\
+                    `mackrl maps NAME` shows one of them with its armies and its terrain.\n";
+
+pub(crate) fn run(args: &MapsArgs) -> anyhow::Result<()> {
+    if let Some(name) = &args.map {
+        return show(name, args.json);
+    }
+    let rows = match &args.check {
+        Some(file) => vec![Row::of(&checked(file)?)],
+        None => all()?,
+    };
+    if args.json {
+        return output::print_json(&rows);
+    }
+    let also = if args.check.is_none() { ALSO } else { "" };
+    output::print(&(Row::table(&rows) + also))
+}
+
+/// SMAC's maps.
+fn all() -> anyhow::Result<Vec<Row>> {
+    let names = registry::map_names().into_iter();
+    names
+        .map(|name| {
+            let skirmish = registry::make_skirmish(name, &SkirmishSettings::default());
+            Ok(Row::of(&skirmish.context("cannot list the maps")?))
+        })
+        .collect()
+}
+
+/// One map, with all that a person asks about it.
+fn show(name: &str, json: bool) -> anyhow::Result<()> {
+    let world = world(ConfigBuilder::new(), &format!("maps {name}"), name, &[])?;
+    if world.is_matrix_game() {
+        let game = card::MatrixGameCard::new(world.make()?.spec());
+        return if json {
+            output::print_json(&game)
+        } else {
+            output::print(&game.to_string())
+        };
+    }
+    let card = Card::of(&world.skirmish()?);
+    if json {
+        output::print_json(&card)
+    } else {
+        output::print(&card.to_string())
+    }
+}
+
+/// The scenario in `file`, if nothing is wrong with it.
+fn checked(file: &Path) -> anyhow::Result<Skirmish> {
+    let text = read_scenario(file)?;
+    let name = file.display().to_string();
+    let skirmish = registry::make_custom(&name, &text, &SkirmishSettings::default());
+    let skirmish = skirmish.map_err(|error| ConfigError::Scenario {
+        message: error.to_string(),
+    })?;
+    Ok(skirmish)
+}
