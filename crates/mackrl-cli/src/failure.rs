@@ -8,6 +8,7 @@ use std::{
 };
 
 use mackrl::config::{Config, ConfigError};
+use mackrl_env::StepError;
 
 use crate::provenance::CODE;
 
@@ -46,6 +47,11 @@ pub(crate) enum Failure {
     },
     /// A result of another version of this program, among which results of this one were to stand.
     OtherCode { path: PathBuf, code: String },
+    /// StarCraft II is not as it has to be.
+    NotReady {
+        /// How much is wrong.
+        problems: usize,
+    },
     /// A team that does not run decentralised.
     CertificateFailed { mismatches: u64 },
     /// Flags that do not go together.
@@ -107,6 +113,12 @@ impl fmt::Display for Failure {
             | Self::Usage { message }
             | Self::ReplayDiffers { message }
             | Self::OtherSimulator { message, .. } => formatter.write_str(message),
+            Self::NotReady { problems } => {
+                write!(
+                    formatter,
+                    "StarCraft II cannot be played on here: problems: {problems}"
+                )
+            }
             Self::CertificateFailed { mismatches } => write!(
                 formatter,
                 "not decentralised: {mismatches} actions differ from the central run"
@@ -180,11 +192,13 @@ fn exit_of(cause: &(dyn std::error::Error + 'static)) -> Option<Exit> {
             Failure::CertificateFailed { .. }
             | Failure::Different { .. }
             | Failure::NotReproduced { .. } => Exit::Differs,
+            Failure::NotReady { .. } => Exit::InputOutput,
         });
     }
     if let Some(error) = cause.downcast_ref::<mackrl::Error>() {
         return Some(match error {
             mackrl::Error::Config(_) => Exit::Configuration,
+            mackrl::Error::Step(StepError::Interrupted(_)) => Exit::InputOutput,
             mackrl::Error::Data(_) | mackrl::Error::NotFinite { .. } => Exit::Data,
             _ => Exit::Defect,
         });
@@ -239,6 +253,9 @@ fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
             }
             _ => None,
         };
+    }
+    if let Some(mackrl::Error::Step(StepError::Interrupted(_))) = cause.downcast_ref() {
+        return Some("`mackrl sc2 doctor --start` looks for the cause".to_owned());
     }
     match cause.downcast_ref::<ConfigError>()? {
         ConfigError::UnknownMap { .. } => Some("`mackrl maps` lists every map".to_owned()),

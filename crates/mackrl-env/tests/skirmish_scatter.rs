@@ -1,8 +1,8 @@
 //! Where episodes begin: near the places of the map, a little differently every time.
 
 use mackrl_env::{
-    Environment, EpisodeKey, Observations, Stream, registry,
-    skirmish::{Skirmish, SkirmishSettings, rules::BattleState},
+    Action, AgentId, Environment, EpisodeKey, Observations, Stream, registry,
+    skirmish::{EnemyBehaviour, Skirmish, SkirmishSettings, rules::BattleState},
 };
 
 /// Map units that pushing may add to a scatter, in the densest army.
@@ -100,4 +100,39 @@ fn two_episodes_start_at_different_places() {
     assert_ne!(one.x, other.x);
     assert_ne!(one.y, other.y);
     assert_eq!(begin(&mut skirmish, 0).x, one.x);
+}
+
+#[test]
+fn enemies_that_hunt_find_a_team_that_hides_and_those_of_the_map_do_not() {
+    for (enemy_order, found) in [(EnemyBehaviour::Map, false), (EnemyBehaviour::Hunt, true)] {
+        let settings = SkirmishSettings {
+            enemy_order,
+            ..SkirmishSettings::default()
+        };
+        let mut skirmish = registry::make_skirmish("3m", &settings).expect("the map is shipped");
+        let mut observations = Observations::new(skirmish.spec(), 1);
+        let key = EpisodeKey::new(5, Stream::Other, 0);
+        skirmish.reset(key, &mut observations.row_mut(0));
+        let (stop, north) = (Action::new(1), Action::new(2));
+        loop {
+            // To the northern edge, and no further; the dead do nothing.
+            let actions: Vec<Action> = (0..3)
+                .map(|agent| {
+                    let available = observations.local_view(0, AgentId::new(agent)).available();
+                    [north, stop, Action::new(0)]
+                        .into_iter()
+                        .find(|action| available[action.index()])
+                        .expect("one of them is always available")
+                })
+                .collect();
+            let step = skirmish
+                .step(&actions, &mut observations.row_mut(0))
+                .expect("the actions are available");
+            if step.end.is_some() {
+                break;
+            }
+        }
+        let dead = skirmish.statistics().dead_allies;
+        assert_eq!(dead == 3, found, "{enemy_order:?}: {dead} dead");
+    }
 }

@@ -6,6 +6,7 @@ mod inquiry;
 mod play;
 mod replay;
 mod runs;
+mod sc2;
 
 use std::path::PathBuf;
 
@@ -20,9 +21,13 @@ pub(crate) use bench::{
 };
 pub(crate) use configuration::{ConfigurationArgs, read_scenario, with_scenario};
 pub(crate) use inquiry::{DebugArgs, DiffArgs};
-pub(crate) use play::PlayArgs;
+pub(crate) use play::{PlayArgs, PolicyChoice};
 pub(crate) use replay::{ExplainArgs, ReplayArgs};
 pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, TrainArgs};
+pub(crate) use sc2::{
+    DoctorArgs, ExecGameArgs, InstallArgs, KillArgs, PsArgs, RecordArgs, Sc2Args, Sc2Command,
+    ServeArgs, UnitsChoice,
+};
 
 /// Teaches teams to coordinate without communicating, by acting jointly on what they commonly know.
 ///
@@ -56,6 +61,7 @@ pub(crate) enum Command {
     Debug(DebugArgs),
     Config(ConfigArgs),
     Bench(BenchArgs),
+    Sc2(Sc2Args),
 }
 
 /// Reproduce a figure of the paper, and judge what the paper says about it

@@ -6,6 +6,7 @@ use mackrl::training::Trainer;
 
 use crate::{
     args::ResumeArgs,
+    commands::sc2,
     provenance::CODE,
     run_folder::{Resumption, RunFolder},
     signals::StopRequest,
@@ -39,7 +40,7 @@ pub(crate) fn run(args: &ResumeArgs) -> anyhow::Result<()> {
             "warning: the run was made by code {code} and goes on with {CODE}: it may not be what either of them makes alone"
         );
     }
-    let mut trainer = Trainer::new(&config, threads)?;
+    let mut trainer = Trainer::in_world(&config, &sc2::world(&config)?, threads)?;
     if let Some(checkpoint) = checkpoint {
         trainer.restore(&checkpoint)?;
     }

@@ -10,6 +10,7 @@ use crate::{
     skirmish::{
         rules::{Battle, BattleState, Chance, Order, Stance, Team, UnitIndex},
         scenario::{EnemyOrder, Scenario},
+        settings::{EnemyBehaviour, SkirmishSettings},
     },
 };
 
@@ -19,15 +20,17 @@ pub struct Encounter {
     scenario: Arc<Scenario>,
     /// Everybody at the places of the map.
     muster: BattleState,
+    /// What the enemies are told.
+    enemy_order: EnemyOrder,
     /// How far from these places an episode starts, in map units along each axis.
     scatter: f32,
     pub(super) battle: Battle,
 }
 
 impl Encounter {
-    /// Puts everybody at their places. Episodes will start up to `scatter` map units from there along each axis.
+    /// Puts everybody at their places. Of `settings`, `enemy_order` and `spawn_scatter` count here.
     #[must_use]
-    pub fn new(scenario: Arc<Scenario>, scatter: f32) -> Self {
+    pub fn new(scenario: Arc<Scenario>, settings: &SkirmishSettings) -> Self {
         let mut battle = Battle::new(scenario.field.clone(), scenario.recruits.len());
         for recruit in &scenario.recruits {
             let stance = match recruit.team {
@@ -38,7 +41,11 @@ impl Encounter {
         }
         Self {
             muster: battle.state().clone(),
-            scatter,
+            enemy_order: match settings.enemy_order {
+                EnemyBehaviour::Map => scenario.enemy_order,
+                EnemyBehaviour::Hunt => EnemyOrder::Hunt,
+            },
+            scatter: settings.spawn_scatter,
             battle,
             scenario,
         }
@@ -89,7 +96,7 @@ impl Encounter {
     }
 
     fn order_enemies(&mut self, chance: &mut Chance) {
-        let to = match self.scenario.enemy_order {
+        let to = match self.enemy_order {
             EnemyOrder::None => return,
             EnemyOrder::Hunt => None,
             EnemyOrder::AttackMove(to) => Some(to),

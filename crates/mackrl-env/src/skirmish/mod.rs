@@ -20,7 +20,7 @@ pub use encounter::Encounter;
 pub use error::SkirmishError;
 pub use face::{BattleTally, Face, Skirmish, SkirmishKnowledge};
 pub use scenario::Scenario;
-pub use settings::{Compatibility, SkirmishSettings};
+pub use settings::{Compatibility, EnemyBehaviour, SkirmishSettings};
 pub use unit_types::UnitData;
 
 /// Version of the rules and of their data: one key and the same actions give the same battle in every program with this number.

@@ -16,6 +16,18 @@ pub enum Compatibility {
     Clean,
 }
 
+/// What the enemies are told when an episode begins.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EnemyBehaviour {
+    /// The map's own order. Most maps send the enemies to where the agents started; there they stay, and a team that hides is
+    /// never found.
+    #[default]
+    Map,
+    /// To go for the nearest agent, wherever it is, until none is left.
+    Hunt,
+}
+
 /// How a skirmish is played and shown to agents.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -24,6 +36,8 @@ pub struct SkirmishSettings {
     pub units: UnitData,
     /// Which of SMAC's peculiarities are kept.
     pub compat: Compatibility,
+    /// What the enemies are told when an episode begins. Not in SMAC, whose maps say it.
+    pub enemy_order: EnemyBehaviour,
     /// Map units by which a unit starts beside its place on the map, at most, along each axis; drawn anew for every episode; in
     /// \[0, 4\]. Not in SMAC, where the engine places units: see `DEVIATIONS.md`.
     pub spawn_scatter: f32,
@@ -76,6 +90,7 @@ impl Default for SkirmishSettings {
         Self {
             units: UnitData::Liberty,
             compat: Compatibility::Smac,
+            enemy_order: EnemyBehaviour::Map,
             spawn_scatter: 0.5,
             move_amount: 2.0,
             sight_range: 9.0,

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     Error,
-    config::{ConfigError, Origin, Setting},
+    config::{ConfigError, Engine, Origin, Setting},
 };
 
 /// The world that is played in.
@@ -25,6 +25,10 @@ pub struct EnvironmentConfig {
     /// Text of a scenario that is played instead of a shipped map; empty for shipped maps. It is stored, not its file's name
     /// alone, so that a run folder holds all that its result depends on.
     pub scenario: String,
+    /// What plays the battles: the built-in simulator, or StarCraft II on this machine.
+    pub engine: Engine,
+    /// Version of StarCraft II, such as `4.10.0`; empty for the latest that is installed.
+    pub game_version: String,
     /// Settings of skirmishes, written beside the map: `env.move_amount`, `env.sight_range` and so on.
     #[serde(flatten)]
     pub settings: SkirmishSettings,
@@ -37,6 +41,8 @@ impl Default for EnvironmentConfig {
         Self {
             map: "3m".to_owned(),
             scenario: String::new(),
+            engine: Engine::Simulator,
+            game_version: String::new(),
             settings: SkirmishSettings::default(),
             matrix_game: MatrixGameSettings::default(),
         }
@@ -55,6 +61,16 @@ impl EnvironmentConfig {
             documentation: "Text of a scenario that is played instead of a shipped map; filled in from the file that env.map names.",
             expects: "the text of a scenario file, as `mackrl maps --check` accepts it",
         },
+        Setting {
+            key: "env.engine",
+            documentation: "What plays the battles: the built-in simulator, or StarCraft II on this machine.",
+            expects: "`simulator` or `sc2`",
+        },
+        Setting {
+            key: "env.game_version",
+            documentation: "Version of StarCraft II, such as 4.10.0; empty for the latest that is installed.",
+            expects: "a version of StarCraft II, or nothing",
+        },
     ];
 
     /// The scenario file whose text has still to be laid into `env.scenario`, if the map is one.
@@ -63,11 +79,15 @@ impl EnvironmentConfig {
         (self.scenario.is_empty() && self.map.ends_with(".toml")).then_some(self.map.as_str())
     }
 
-    /// Builds the world.
+    /// Builds the world in the built-in simulator.
     ///
     /// # Errors
-    /// [`Error::Config`] if the map is unknown or a setting is out of its range.
+    /// [`Error::Config`] if the map is unknown, a setting is out of its range, or another engine is to play.
     pub fn make(&self) -> Result<Box<dyn Environment>, Error> {
+        if self.engine != Engine::Simulator {
+            let message = "env.engine is `sc2`, but only the built-in simulator can be used here";
+            return Err(Error::Config(message.to_owned()));
+        }
         if self.scenario.is_empty() && self.map == MATRIX_GAME {
             return registry::make_matrix_game(self.matrix_game)
                 .map(|game| Box::new(game) as _)

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use mackrl_env::{Action, Environment, EpisodeKey, Observations};
+use mackrl_env::{Action, Environment, EpisodeKey, Observations, StepError};
 
 use super::{Episode, RolloutSettings};
 use crate::{
@@ -26,6 +26,8 @@ pub struct Shard {
     actions_bn: Vec<Action>,
     agents: usize,
     batch: ShardBatch,
+    /// Episodes that were played in vain.
+    discarded: u64,
 }
 
 impl Shard {
@@ -50,6 +52,7 @@ impl Shard {
                 episodes: Vec::new(),
                 actor,
             },
+            discarded: 0,
         }
     }
 
@@ -64,12 +67,37 @@ impl Shard {
         &mut self.batch
     }
 
+    /// Episodes so far that were played in vain because a world failed.
+    #[must_use]
+    pub const fn discarded(&self) -> u64 {
+        self.discarded
+    }
+
     /// Plays the episodes named `keys`, at most one per environment, to their ends.
     ///
+    /// If a world fails under one of them, all are played again from their beginnings: the actor holds what it computed for
+    /// all rows of a step together, and a failure is rare. Nothing of the failed attempt is kept.
+    ///
     /// # Errors
-    /// If an environment refuses an action, which means that the policy's masks disagree with it, or if something that an
-    /// environment or a controller gives is not finite.
+    /// If an environment refuses an action, which means that the policy's masks disagree with it, or cannot be played in any
+    /// more, or if something that an environment or a controller gives is not finite.
     pub fn play(
+        &mut self,
+        weights: &Weights,
+        keys: &[EpisodeKey],
+        settings: RolloutSettings,
+    ) -> Result<(), Error> {
+        loop {
+            match self.attempt(weights, keys, settings) {
+                Err(Error::Step(StepError::Interrupted(failure))) if failure.can_be_repeated => {
+                    self.discarded += keys.len() as u64;
+                }
+                outcome => return outcome,
+            }
+        }
+    }
+
+    fn attempt(
         &mut self,
         weights: &Weights,
         keys: &[EpisodeKey],

@@ -16,7 +16,7 @@ mod weights;
 
 pub use checkpoint::Checkpoint;
 pub use comparison::{Difference, compare_tensors};
-pub use evaluation::{Evaluation, evaluate};
+pub use evaluation::{Episodes, Evaluation, evaluate, evaluate_in};
 pub use examination::{Examination, Part, TensorStatistics};
 pub use metrics::{METRICS, MetricRow};
 pub use trainer::Trainer;

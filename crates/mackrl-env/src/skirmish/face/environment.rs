@@ -31,7 +31,7 @@ impl Skirmish {
     /// # Errors
     /// [`SkirmishError::Setting`] if a setting is out of range.
     pub fn new(scenario: Arc<Scenario>, settings: SkirmishSettings) -> Result<Self, SkirmishError> {
-        let encounter = Encounter::new(Arc::clone(&scenario), settings.spawn_scatter);
+        let encounter = Encounter::new(Arc::clone(&scenario), &settings);
         Ok(Self {
             face: Face::new(scenario, settings, encounter.muster())?,
             encounter,
