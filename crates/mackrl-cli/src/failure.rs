@@ -180,13 +180,13 @@ fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
         ConfigError::Scenario { .. } => Some(
             "examples/scenarios/sniper-alley.toml explains every line of a scenario".to_owned(),
         ),
-        ConfigError::UnknownKey { .. } => {
-            Some("`mackrl config --print` lists every setting".to_owned())
-        }
+        ConfigError::UnknownKey { .. } => Some(
+            "`mackrl config --print` lists every setting, `mackrl config --explain KEY` explains one".to_owned(),
+        ),
         ConfigError::WrongValue { key, .. } => {
             let settings = Config::settings();
-            let setting = settings.iter().find(|setting| setting.key == key)?;
-            Some(format!("{key}: {}", setting.meaning()))
+            let setting = settings.iter().find(|setting| setting.key == *key)?;
+            Some(format!("{key}: {}", setting.meaning))
         }
         ConfigError::Syntax { .. } => {
             Some("settings are written as TOML, such as learner.gamma = 0.95".to_owned())
@@ -249,7 +249,7 @@ mod tests {
         assert_eq!(
             explain(&error),
             "error: cannot configure: --set gama=1: unknown key `gama`, did you mean `learner.gamma`?\n\
-             hint: `mackrl config --print` lists every setting\n"
+             hint: `mackrl config --print` lists every setting, `mackrl config --explain KEY` explains one\n"
         );
     }
 }

@@ -2,9 +2,10 @@
 
 use std::fmt;
 
+use mackrl_env::settings::Violation;
 use thiserror::Error;
 
-/// Where a value was written.
+/// Where a value was written; later layers are greater.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Origin {
@@ -114,6 +115,42 @@ pub enum ConfigError {
 }
 
 impl ConfigError {
+    /// The error for a value that the setting in this section does not take.
+    pub(super) fn violation(
+        section: &str,
+        violation: Violation,
+        origin_of: impl Fn(&str) -> Origin,
+    ) -> Self {
+        let key = format!("{section}.{}", violation.name);
+        Self::WrongValue {
+            origin: origin_of(&key),
+            key,
+            found: violation.found,
+            expected: violation.accepts.to_string(),
+        }
+    }
+
+    /// The error for two values that do not go together, each given as key, value and what is expected beside the other: it
+    /// names the one that was written later.
+    pub(super) fn at_odds(
+        origin_of: &impl Fn(&str) -> Origin,
+        one: (&str, String, String),
+        other: (&str, String, String),
+    ) -> Self {
+        let later = if origin_of(other.0) > origin_of(one.0) {
+            other
+        } else {
+            one
+        };
+        let (key, found, expected) = later;
+        Self::WrongValue {
+            origin: origin_of(key),
+            key: key.to_owned(),
+            found,
+            expected,
+        }
+    }
+
     /// The error for a map `name` that is not among the `known` ones.
     #[must_use]
     pub fn unknown_map<'a>(

@@ -35,10 +35,10 @@ struct Player {
 pub(super) fn run(args: &BenchEnvironmentArgs) -> anyhow::Result<()> {
     let typed = format!("--map {}", args.map);
     let layers = ConfigBuilder::new().flag(&typed, &format!("env.map={}", args.map))?;
-    let config = with_scenario(layers)?.build()?;
+    let world = with_scenario(layers)?.build_environment()?;
     let players = (0..args.threads.get() as u64).map(|seed| {
         Ok(Player {
-            play: RandomPlay::new(config.env.make()?, seed),
+            play: RandomPlay::new(world.make()?, seed),
             outcome: Ok(()),
         })
     });

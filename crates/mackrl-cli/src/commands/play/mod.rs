@@ -66,7 +66,7 @@ fn map(args: &PlayArgs, name: &str) -> anyhow::Result<EnvironmentConfig> {
     for assignment in &args.set {
         builder = builder.set(assignment)?;
     }
-    Ok(with_scenario(builder)?.build()?.env)
+    Ok(with_scenario(builder)?.build_environment()?)
 }
 
 /// Plays many episodes of each map by each policy, and prints how they went.
