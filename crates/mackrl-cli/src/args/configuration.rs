@@ -2,12 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
 use clap::Args;
-use mackrl::config::{ConfigBuilder, ConfigError};
+use mackrl::config::ConfigBuilder;
 use mackrl_env::skirmish::custom::LENGTH_MAX;
 
 use crate::bounded;
+
+/// Greatest length of a configuration in bytes; it may hold the text of a scenario, every character escaped.
+const FILE_MAX: usize = 2 << 20;
 
 /// Lays the text of the scenario file that the map names, if it names one.
 pub(crate) fn with_scenario(builder: ConfigBuilder) -> anyhow::Result<ConfigBuilder> {
@@ -19,15 +21,7 @@ pub(crate) fn with_scenario(builder: ConfigBuilder) -> anyhow::Result<ConfigBuil
 
 /// Reads a scenario file, which may be anything: no more of it than a scenario may have.
 pub(crate) fn read_scenario(path: &Path) -> anyhow::Result<String> {
-    let bytes = bounded::read(path, LENGTH_MAX)?;
-    String::from_utf8(bytes).map_err(|error| {
-        let message = format!(
-            "{}: not UTF-8 text at byte {}",
-            path.display(),
-            error.utf8_error().valid_up_to()
-        );
-        ConfigError::Scenario { message }.into()
-    })
+    bounded::read_text(path, LENGTH_MAX)
 }
 
 #[derive(Debug, Clone, Args)]
@@ -72,8 +66,7 @@ impl ConfigurationArgs {
         let mut builder = ConfigBuilder::new().preset(&self.preset)?;
         if let Some(path) = &self.config {
             let name = path.display().to_string();
-            let text =
-                std::fs::read_to_string(path).with_context(|| format!("cannot read {name}"))?;
+            let text = bounded::read_text(path, FILE_MAX)?;
             builder = builder.file(&name, &text)?;
         }
         for (flag, key, value) in self.short_flags() {

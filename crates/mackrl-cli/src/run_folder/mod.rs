@@ -17,6 +17,7 @@ mod checkpoints;
 mod disk;
 mod manifest;
 mod run;
+mod untrusted;
 
 use std::{
     fs::{self, File, OpenOptions, TryLockError},
@@ -25,10 +26,13 @@ use std::{
 };
 
 use anyhow::Context;
-use mackrl::{config::Config, training::Checkpoint};
+use mackrl::{
+    config::Config,
+    training::{Checkpoint, assembly::tensors_bytes_max},
+};
 use serde::{Deserialize, Serialize};
 
-use crate::failure::Failure;
+use crate::{bounded, failure::Failure};
 use checkpoints::Surroundings;
 use disk::{Disk, RealDisk, cannot, cannot_write};
 use manifest::{Fingerprint, Growing};
@@ -39,6 +43,7 @@ const METRICS: &str = "metrics.jsonl";
 const RUN: &str = "run.json";
 const WEIGHTS: &str = "weights.safetensors";
 const LOCK: &str = "lock";
+const CHECKPOINTS: &str = "checkpoints";
 
 /// How far a run has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -142,7 +147,7 @@ impl RunFolder {
         // Somebody else may have been quicker, and be done already.
         Self::check_free(path)?;
         disk::replace(&RealDisk, &path.join(CONFIG), config.to_toml().as_bytes())?;
-        Self::open(path, config, threads, lock, 0)
+        Self::open(path, config, threads, lock, Growing::default())
     }
 
     /// Whether the run there has reached its end.
@@ -157,32 +162,34 @@ impl RunFolder {
     /// [`Failure::NotARun`], [`Failure::FolderLocked`] if another process writes there, [`Failure::BadData`] if no checkpoint can
     /// be used; otherwise the path that could not be read or written.
     pub(crate) fn resume(path: &Path, threads: usize) -> anyhow::Result<Resumption> {
+        untrusted::check(path)?;
         let config = run::read_config(path)?;
         let lock = lock(path)?;
-        let (latest, damaged) = checkpoints::latest(path)?;
-        let (number, metrics_bytes) = latest.as_ref().map_or((None, 0), |stored| {
-            (Some(stored.number), stored.metrics_bytes)
-        });
-        checkpoints::tidy(&RealDisk, path, number)?;
+        let (latest, damaged) = checkpoints::latest(path, tensors_bytes_max(&config)?)?;
+        checkpoints::tidy(&RealDisk, path, latest.as_ref().map(|stored| stored.number))?;
+        let (metrics, checkpoint) = latest
+            .map(|stored| (stored.metrics, stored.checkpoint))
+            .unzip();
+        let metrics = metrics.unwrap_or_default();
         Ok(Resumption {
-            folder: Self::open(path, &config, threads, lock, metrics_bytes)?,
+            folder: Self::open(path, &config, threads, lock, metrics)?,
             config,
-            checkpoint: latest.map(|stored| stored.checkpoint),
+            checkpoint,
             damaged,
         })
     }
 
-    /// Opens the folder with so many bytes of metrics.
+    /// Opens the folder with these metrics.
     fn open(
         path: &Path,
         config: &Config,
         threads: usize,
         lock: File,
-        metrics_bytes: usize,
+        metrics_so_far: Growing,
     ) -> anyhow::Result<Self> {
         let config_path = path.join(CONFIG);
-        let config_text = fs::read(&config_path).with_context(|| cannot("read", &config_path))?;
-        let (metrics, metrics_so_far) = open_metrics(&path.join(METRICS), metrics_bytes)?;
+        let config_text = bounded::read(&config_path, untrusted::TEXT_MAX)?;
+        let metrics = open_metrics(&path.join(METRICS), metrics_so_far.bytes())?;
         let mut record = read_record(path).unwrap_or_else(|| RunRecord {
             command: std::env::args().collect(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -283,18 +290,16 @@ fn lock(path: &Path) -> anyhow::Result<File> {
 }
 
 /// Opens the metrics for appending, and cuts off everything after the first `bytes` bytes.
-fn open_metrics(path: &Path, bytes: usize) -> anyhow::Result<(File, Growing)> {
+fn open_metrics(path: &Path, bytes: u64) -> anyhow::Result<File> {
     let file = OpenOptions::new()
         .create(true)
         .append(true)
         .open(path)
         .with_context(|| cannot("open", path))?;
-    file.set_len(bytes as u64)
+    file.set_len(bytes)
         .and_then(|()| file.sync_all())
         .with_context(|| cannot("cut", path))?;
-    let mut so_far = Growing::default();
-    so_far.append(&fs::read(path).with_context(|| cannot("read", path))?);
-    Ok((file, so_far))
+    Ok(file)
 }
 
 fn recorded_status(path: &Path) -> Option<Status> {
@@ -302,8 +307,8 @@ fn recorded_status(path: &Path) -> Option<Status> {
 }
 
 fn read_record(path: &Path) -> Option<RunRecord> {
-    let text = fs::read_to_string(path.join(RUN)).ok()?;
-    serde_json::from_str(&text).ok()
+    let json = bounded::read(&path.join(RUN), untrusted::TEXT_MAX).ok()?;
+    serde_json::from_slice(&json).ok()
 }
 
 #[cfg(test)]

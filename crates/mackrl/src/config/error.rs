@@ -160,7 +160,7 @@ impl ConfigError {
     ) -> Self {
         Self::UnknownMap {
             origin,
-            name: name.to_owned(),
+            name: shortened(name),
             nearest: nearest(name, known),
         }
     }
@@ -170,6 +170,17 @@ impl From<ConfigError> for crate::Error {
     fn from(error: ConfigError) -> Self {
         Self::Config(error.to_string())
     }
+}
+
+/// What somebody wrote, fit for a message: no longer than a line.
+pub(super) fn shortened(text: &str) -> String {
+    const LENGTH_MAX: usize = 80;
+    let mut characters = text.chars();
+    let mut short: String = characters.by_ref().take(LENGTH_MAX).collect();
+    if characters.next().is_some() {
+        short.push('…');
+    }
+    short
 }
 
 fn suggestion(nearest: Option<&str>) -> String {
@@ -184,6 +195,11 @@ pub(super) fn nearest<'a>(
     candidates: impl IntoIterator<Item = &'a str>,
 ) -> Option<String> {
     const SIMILAR: f64 = 0.6;
+    /// Longer than any name; comparing takes time and memory proportional to the length.
+    const LENGTH_MAX: usize = 100;
+    if name.len() > LENGTH_MAX {
+        return None;
+    }
     let last = |key: &str| key.rsplit('.').next().unwrap_or_default().to_owned();
     let similarity = |candidate: &str| {
         let whole = strsim::normalized_damerau_levenshtein(name, candidate);
@@ -222,6 +238,14 @@ mod tests {
     #[test]
     fn one_slip_in_a_short_name_is_forgiven() {
         assert_eq!(nearest("3n", ["8m", "3m", "2s3z"]).as_deref(), Some("3m"));
+    }
+
+    #[test]
+    fn what_is_endless_is_shortened_and_not_compared() {
+        let endless = "gamma".repeat(1000);
+        assert_eq!(nearest(&endless, KEYS), None);
+        assert_eq!(shortened(&endless).chars().count(), 81);
+        assert_eq!(shortened("gamma"), "gamma");
     }
 
     #[test]

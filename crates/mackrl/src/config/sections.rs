@@ -8,7 +8,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::{
     Algorithm, CommonKnowledgeFeatures, ConfigError, Delegation, EnvironmentConfig, OptimiserKind,
-    Origin, PartitionChoice, Setting, error::nearest, settings::in_section,
+    Origin, PartitionChoice, Setting,
+    error::{nearest, shortened},
+    settings::in_section,
 };
 
 /// Everything that determines the result of a run.
@@ -131,7 +133,7 @@ impl Config {
         let nearest = nearest(name, settings.iter().map(|setting| setting.key.as_str()));
         settings.retain(|setting| setting.key == name || setting.key.starts_with(&section));
         if settings.is_empty() {
-            let key = name.to_owned();
+            let key = shortened(name);
             return Err(ConfigError::UnknownKey {
                 origin,
                 key,

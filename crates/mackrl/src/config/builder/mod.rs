@@ -7,6 +7,7 @@ use serde::Deserialize;
 use crate::config::{
     Config, ConfigError, EnvironmentConfig, Origin, Preset,
     document::{Leaf, SyntaxError, line_and_column, parse_assignment, parse_document},
+    error::shortened,
 };
 
 /// Lays settings over each other, later ones over earlier ones, and remembers where each came from.
@@ -175,7 +176,7 @@ impl ConfigBuilder {
     fn lay(&mut self, leaf: Leaf, key_at: Origin, value_at: Origin) -> Result<(), ConfigError> {
         let key = leaf.path.join(".");
         Config::settings_called(&key, key_at)?;
-        let found = leaf.value.to_string();
+        let found = shortened(&leaf.value.to_string());
         let mut table = self.table.clone();
         insert(&mut table, &leaf.path, leaf.value);
         if let Err(error) = Config::deserialize(table.clone()) {
