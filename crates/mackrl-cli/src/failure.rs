@@ -111,11 +111,25 @@ pub(crate) fn report(outcome: anyhow::Result<()>) -> ExitCode {
 
 /// The chain of causes on one line, and the remedy on another if one is known.
 fn explain(error: &anyhow::Error) -> String {
-    let mut text = format!("error: {error:#}\n");
+    let mut text = format!("error: {}\n", printable(&format!("{error:#}")));
     if let Some(hint) = hint(error) {
         text.push_str(&format!("hint: {hint}\n"));
     }
     text
+}
+
+/// What may be shown of a text that quotes a stranger's file: one line, not endless, and nothing that controls a terminal.
+pub(crate) fn printable(text: &str) -> String {
+    const LENGTH_MAX: usize = 1000;
+    let mut characters = text.chars();
+    let shown = characters.by_ref().take(LENGTH_MAX);
+    let mut shown: String = shown
+        .map(|c| if c.is_control() { ' ' } else { c })
+        .collect();
+    if characters.next().is_some() {
+        shown.push('…');
+    }
+    shown
 }
 
 fn exit(error: &anyhow::Error) -> Exit {
@@ -239,6 +253,12 @@ mod tests {
         for (error, expected) in cases {
             assert_eq!(exit(&error.context("while testing")), expected);
         }
+    }
+
+    #[test]
+    fn what_is_quoted_controls_no_terminal_and_has_an_end() {
+        assert_eq!(printable("a\u{1b}[2J\nb"), "a [2J b");
+        assert_eq!(printable(&"é".repeat(5000)).chars().count(), 1001);
     }
 
     #[test]

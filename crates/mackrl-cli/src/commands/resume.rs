@@ -6,6 +6,7 @@ use mackrl::training::Trainer;
 
 use crate::{
     args::ResumeArgs,
+    failure::printable,
     run_folder::{Resumption, RunFolder},
     signals::StopRequest,
     training_loop::{self, Reporting},
@@ -29,12 +30,16 @@ pub(crate) fn run(args: &ResumeArgs) -> anyhow::Result<()> {
     } = RunFolder::resume(&args.run, threads)?;
     for damage in damaged {
         // The run continues from an earlier checkpoint, whether anybody reads this or not.
-        let _ = writeln!(io::stderr(), "warning: {damage}; an earlier one is used");
+        let _ = writeln!(
+            io::stderr(),
+            "warning: {}; an earlier one is used",
+            printable(&damage)
+        );
     }
-    let mut trainer = Trainer::new(&config, threads)?;
-    if let Some(checkpoint) = checkpoint {
-        trainer.restore(&checkpoint)?;
-    }
+    let trainer = match checkpoint {
+        Some(checkpoint) => Trainer::resumed(&config, threads, &checkpoint)?,
+        None => Trainer::new(&config, threads)?,
+    };
     let mut training = Reporting::new(trainer, &config);
     let summary = training_loop::train_into(&mut folder, &mut training, &config, &stop)?;
     training_loop::print(&summary, args.json)

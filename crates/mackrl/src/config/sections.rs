@@ -130,16 +130,15 @@ impl Config {
     pub fn settings_called(name: &str, origin: Origin) -> Result<Vec<Setting>, ConfigError> {
         let mut settings = Self::settings();
         let section = format!("{name}.");
-        let nearest = nearest(name, settings.iter().map(|setting| setting.key.as_str()));
-        settings.retain(|setting| setting.key == name || setting.key.starts_with(&section));
-        if settings.is_empty() {
-            let key = shortened(name);
+        let is_meant = |setting: &Setting| setting.key == name || setting.key.starts_with(&section);
+        if !settings.iter().any(is_meant) {
             return Err(ConfigError::UnknownKey {
                 origin,
-                key,
-                nearest,
+                key: shortened(name),
+                nearest: nearest(name, settings.iter().map(|setting| setting.key.as_str())),
             });
         }
+        settings.retain(is_meant);
         Ok(settings)
     }
 

@@ -8,7 +8,7 @@ use super::{
     Checkpoint, Evaluation, MetricRow, assembly,
     checkpoint::{Counters, Layouts, State},
     evaluation::Evaluator,
-    write_weights,
+    read_weights, write_weights,
 };
 use crate::{
     Error, Phase, Stopwatch,
@@ -73,6 +73,24 @@ impl Trainer {
             interval: Interval::new(0),
             stopwatch: Stopwatch::default(),
         })
+    }
+
+    /// As [`Self::new`], continued where `checkpoint` was taken; see [`Self::restore`]. Nothing large is made before it is known
+    /// that the checkpoint holds a policy of the configured size, because both may be a stranger's.
+    ///
+    /// # Errors
+    /// As [`Self::new`] and [`Self::restore`].
+    pub fn resumed(
+        config: &Config,
+        threads: usize,
+        checkpoint: &Checkpoint,
+    ) -> Result<Self, Error> {
+        let world = assembly::World::new(config)?;
+        let policy = assembly::policy(config, &world)?;
+        read_weights(policy.layout(), &checkpoint.tensors)?;
+        let mut trainer = Self::new(config, threads)?;
+        trainer.restore(checkpoint)?;
+        Ok(trainer)
     }
 
     /// Environment steps so far, summed over the parallel environments.

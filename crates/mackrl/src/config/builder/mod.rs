@@ -85,7 +85,7 @@ impl ConfigBuilder {
     /// As [`ConfigBuilder::set`]; the error names `typed`.
     pub fn flag(mut self, typed: &str, assignment: &str) -> Result<Self, ConfigError> {
         let origin = Origin::CommandLine {
-            text: typed.to_owned(),
+            text: shortened(typed),
         };
         let leaves = parse_assignment(assignment).map_err(|SyntaxError { message, .. }| {
             ConfigError::Syntax {
