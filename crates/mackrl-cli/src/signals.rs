@@ -48,6 +48,11 @@ impl StopRequest {
         self.0.load(Ordering::Relaxed)
     }
 
+    /// What is set as soon as a signal has arrived.
+    pub(crate) const fn flag(&self) -> &Arc<AtomicBool> {
+        &self.0
+    }
+
     /// Asks to stop, as a signal would.
     #[cfg(test)]
     pub(crate) fn make(&self) {

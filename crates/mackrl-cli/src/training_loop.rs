@@ -48,8 +48,9 @@ pub(crate) struct Reporting {
 }
 
 impl Reporting {
-    /// A trainer of the run that `config` describes, at its beginning or restored.
-    pub(crate) fn new(trainer: Trainer, config: &Config) -> Self {
+    /// A trainer of the run that `config` describes, at its beginning or restored, that gives up when asked to stop.
+    pub(crate) fn new(mut trainer: Trainer, config: &Config, stop: &StopRequest) -> Self {
+        trainer.stop_when(stop.flag());
         let standing = Standing {
             steps_env: trainer.steps_env(),
             steps_env_total: config.run.steps_env,
@@ -158,7 +159,11 @@ fn train(
             }
             .into());
         }
-        let Update { metrics, standing } = training.update()?;
+        let Update { metrics, standing } = match training.update() {
+            // What was begun was given up; the checkpoint is that of the moment before.
+            Err(mackrl::Error::Stopped) => continue,
+            outcome => outcome?,
+        };
         if let Some(metrics) = metrics {
             folder.append_metrics(&metrics)?;
         }

@@ -74,11 +74,39 @@ fn a_second_interrupt_stops_at_once() {
     // After the first test come updates, each of which lasts longer than this test waits.
     assert!(wait_until(&mut child, || fs::metadata(&metrics)
         .is_ok_and(|metadata| metadata.len() > 0)));
-    send("INT", &child);
-    std::thread::sleep(Duration::from_millis(50));
-    send("INT", &child);
+    // The first asks; writing a checkpoint takes longer than the next ones need to arrive.
+    while child.try_wait().expect("a child can be asked").is_none() {
+        send("INT", &child);
+        std::thread::sleep(Duration::from_millis(2));
+    }
     let output = child.wait_with_output().expect("a child ends");
     told(&output, 130);
+}
+
+#[test]
+fn a_run_of_a_large_team_stops_in_time_and_goes_on() {
+    let parent = tempfile::tempdir().expect("a folder for the run");
+    let run = parent.path().join("run");
+    let large = ["env.map=27m_vs_30m", "policy.partitions=round-robin"];
+    let settings: Vec<&str> = SLOW.iter().copied().chain(large).collect();
+    // Neither its first test nor its first batch is anywhere near its end.
+    for mut command in [train(&run, &settings), resume(&run, 2)] {
+        let mut child = command.spawn().expect("the program starts");
+        let record = run.join("run.json");
+        let begun = || fs::read_to_string(&record).is_ok_and(|text| text.contains("running"));
+        assert!(wait_until(&mut child, begun), "the run ended before TERM");
+        std::thread::sleep(Duration::from_millis(700));
+        send("TERM", &child);
+        let asked = Instant::now();
+        told(&child.wait_with_output().expect("a child ends"), 75);
+        assert!(
+            asked.elapsed() < Duration::from_secs(5),
+            "{:?}",
+            asked.elapsed()
+        );
+        assert!(!has_unfinished_checkpoint(&run), "a checkpoint was written");
+        assert_eq!(checkpoints(&run).len(), 1);
+    }
 }
 
 #[test]

@@ -22,6 +22,9 @@ pub enum Error {
         /// The update in which it was found.
         update: u64,
     },
+    /// Somebody asked to stop; what was begun was given up, and nothing has changed.
+    #[error("stopped as asked")]
+    Stopped,
     /// An environment refused an action.
     #[error(transparent)]
     IllegalAction(#[from] mackrl_env::IllegalAction),

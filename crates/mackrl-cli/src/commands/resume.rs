@@ -40,7 +40,7 @@ pub(crate) fn run(args: &ResumeArgs) -> anyhow::Result<()> {
         Some(checkpoint) => Trainer::resumed(&config, threads, &checkpoint)?,
         None => Trainer::new(&config, threads)?,
     };
-    let mut training = Reporting::new(trainer, &config);
+    let mut training = Reporting::new(trainer, &config, &stop);
     let summary = training_loop::train_into(&mut folder, &mut training, &config, &stop)?;
     training_loop::print(&summary, args.json)
 }

@@ -18,7 +18,7 @@ pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<()> {
     RunFolder::check_free(&path)?;
     let stop = StopRequest::listen()?;
     let threads = args.threads.count();
-    let mut training = Reporting::new(Trainer::new(&config, threads)?, &config);
+    let mut training = Reporting::new(Trainer::new(&config, threads)?, &config, &stop);
     let mut folder = RunFolder::create(&path, &config, threads)?;
     let summary = training_loop::train_into(&mut folder, &mut training, &config, &stop)?;
     training_loop::print(&summary, args.json)

@@ -1,6 +1,12 @@
 //! A shard: a few environments, the actor that plays in them, and the episodes that come out.
 
-use std::fmt;
+use std::{
+    fmt,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+};
 
 use mackrl_env::{Action, Environment, EpisodeKey, Observations};
 
@@ -25,6 +31,8 @@ pub struct Shard {
     actions_bn: Vec<Action>,
     agents: usize,
     batch: ShardBatch,
+    /// Whether to give up: episodes of large teams last seconds.
+    stop: Arc<AtomicBool>,
 }
 
 impl Shard {
@@ -49,7 +57,13 @@ impl Shard {
                 episodes: Vec::new(),
                 actor,
             },
+            stop: Arc::default(),
         }
+    }
+
+    /// Gives episodes up, between two steps, as soon as `stop` is set.
+    pub fn stop_when(&mut self, stop: &Arc<AtomicBool>) {
+        self.stop = Arc::clone(stop);
     }
 
     /// Number of environments.
@@ -66,7 +80,8 @@ impl Shard {
     /// Plays the episodes named `keys`, at most one per environment, to their ends.
     ///
     /// # Errors
-    /// If an environment refuses an action, which means that the policy's masks disagree with it.
+    /// If an environment refuses an action, which means that the policy's masks disagree with it; [`Error::Stopped`] if asked to
+    /// stop.
     pub fn play(
         &mut self,
         weights: &Weights,
@@ -88,6 +103,9 @@ impl Shard {
         for step in 0.. {
             if playing.is_empty() {
                 break;
+            }
+            if self.stop.load(Ordering::Relaxed) {
+                return Err(Error::Stopped);
             }
             let situation = Situation {
                 step,

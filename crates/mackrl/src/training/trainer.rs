@@ -1,6 +1,9 @@
 //! The training loop: a batch of episodes, an update, now and then a test.
 
-use std::time::Instant;
+use std::{
+    sync::{Arc, atomic::AtomicBool},
+    time::Instant,
+};
 
 use mackrl_env::{EpisodeKey, Stream};
 
@@ -93,6 +96,13 @@ impl Trainer {
         Ok(trainer)
     }
 
+    /// Lets [`Self::update`] give up, with [`Error::Stopped`], as soon as `stop` is set: episodes of large teams, and long tests,
+    /// last longer than somebody who wants to stop should wait.
+    pub fn stop_when(&mut self, stop: &Arc<AtomicBool>) {
+        self.rollout.stop_when(stop);
+        self.evaluator.stop_when(stop);
+    }
+
     /// Environment steps so far, summed over the parallel environments.
     #[must_use]
     pub const fn steps_env(&self) -> u64 {
@@ -109,7 +119,8 @@ impl Trainer {
     /// and after the last batch. Gives a row of metrics at every test and at every interval between.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] if a gradient is not finite; the policy has not changed then.
+    /// [`Error::NotFinite`] if a gradient is not finite; the policy has not changed then. [`Error::Stopped`] if asked to stop;
+    /// nothing has changed then, and the same update can be made again.
     pub fn update(&mut self) -> Result<Option<MetricRow>, Error> {
         if self.steps_env >= self.next_test {
             return self.test().map(Some);
@@ -340,6 +351,29 @@ impl std::fmt::Debug for Trainer {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_update_that_is_given_up_leaves_no_trace() {
+        let mut config = Config::default();
+        config.policy.hidden = 3;
+        config.learner.environments = 2;
+        config.test.episodes = 2;
+        let mut trainer = Trainer::new(&config, 1).unwrap();
+        let stop = Arc::default();
+        trainer.stop_when(&stop);
+        let mut undisturbed = Trainer::new(&config, 1).unwrap();
+        // A test, and two updates.
+        for _ in 0..3 {
+            stop.store(true, std::sync::atomic::Ordering::Relaxed);
+            let before = trainer.checkpoint();
+            assert!(matches!(trainer.update(), Err(Error::Stopped)));
+            assert!(trainer.checkpoint() == before);
+            stop.store(false, std::sync::atomic::Ordering::Relaxed);
+            trainer.update().unwrap();
+            undisturbed.update().unwrap();
+            assert!(trainer.checkpoint() == undisturbed.checkpoint());
+        }
+    }
 
     #[test]
     fn exploration_falls_linearly_and_then_stays() {
