@@ -189,6 +189,12 @@ fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
             _ => None,
         };
     }
+    if let Some(error) = cause.downcast_ref::<io::Error>() {
+        use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+        return matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge).then(|| {
+            "make room; a run that was being trained goes on with `mackrl resume DIR`".to_owned()
+        });
+    }
     match cause.downcast_ref::<ConfigError>()? {
         ConfigError::UnknownMap { .. } => Some("`mackrl maps` lists every map".to_owned()),
         ConfigError::Scenario { .. } => Some(

@@ -148,6 +148,9 @@ fn train(
 ) -> anyhow::Result<Summary> {
     let start = Instant::now();
     let steps_env_before = training.standing().steps_env;
+    if config.run.tensorboard {
+        folder.write_events(steps_env_before)?;
+    }
     let interval = config.run.checkpoint_interval_steps_env;
     let mut intervals = steps_env_before / interval;
     while !training.finished() {

