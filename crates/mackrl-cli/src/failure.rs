@@ -9,6 +9,8 @@ use std::{
 
 use mackrl::config::{Config, ConfigError};
 
+use crate::provenance::CODE;
+
 /// What can go wrong in this program beyond what its libraries say.
 #[derive(Debug)]
 pub(crate) enum Failure {
@@ -28,12 +30,20 @@ pub(crate) enum Failure {
     NotARun { folder: PathBuf },
     /// Stored data that cannot be used.
     BadData { message: String },
+    /// A result of another version of this program, among which results of this one were to stand.
+    OtherCode { path: PathBuf, code: String },
     /// A team that does not run decentralised.
     CertificateFailed { mismatches: u64 },
     /// Flags that do not go together.
     Usage { message: String },
     /// A recorded episode that does not play as it did.
     ReplayDiffers { message: String },
+    /// A replay that another version of this program plays.
+    OtherSimulator {
+        message: String,
+        /// Version of the program that plays it.
+        program: String,
+    },
 }
 
 impl fmt::Display for Failure {
@@ -64,9 +74,15 @@ impl fmt::Display for Failure {
                 "{} is not a run folder: it has no config.toml",
                 folder.display()
             ),
+            Self::OtherCode { path, code } => write!(
+                formatter,
+                "{} was made by code {code}, expected {CODE}",
+                path.display()
+            ),
             Self::BadData { message }
             | Self::Usage { message }
-            | Self::ReplayDiffers { message } => formatter.write_str(message),
+            | Self::ReplayDiffers { message }
+            | Self::OtherSimulator { message, .. } => formatter.write_str(message),
             Self::CertificateFailed { mismatches } => write!(
                 formatter,
                 "not decentralised: {mismatches} actions differ from the central run"
@@ -143,9 +159,12 @@ fn exit_of(cause: &(dyn std::error::Error + 'static)) -> Option<Exit> {
             | Failure::UnfinishedRun { .. }
             | Failure::FolderLocked { .. }
             | Failure::NotARun { .. }
+            | Failure::OtherCode { .. }
             | Failure::Usage { .. } => Exit::Usage,
             Failure::Interrupted { .. } => Exit::Interrupted,
-            Failure::BadData { .. } | Failure::ReplayDiffers { .. } => Exit::Data,
+            Failure::BadData { .. }
+            | Failure::ReplayDiffers { .. }
+            | Failure::OtherSimulator { .. } => Exit::Data,
             Failure::CertificateFailed { .. } => Exit::CertificateFailed,
         });
     }
@@ -183,9 +202,17 @@ fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
                 "give the folder that `mackrl train` wrote, such as runs/3m-mackrl-seed1"
                     .to_owned(),
             ),
-            Failure::ReplayDiffers { .. } => Some(
-                "a replay plays the same only in the version of mackrl that recorded it".to_owned(),
+            Failure::OtherCode { .. } => Some(
+                "take such results as they are with --any-code, or choose another folder with --out"
+                    .to_owned(),
             ),
+            Failure::ReplayDiffers { .. } => Some(
+                "the file was changed, or its program simulated otherwise: record it again"
+                    .to_owned(),
+            ),
+            Failure::OtherSimulator { program, .. } => {
+                Some(format!("mackrl {program}, which recorded it, plays it"))
+            }
             _ => None,
         };
     }

@@ -1,7 +1,8 @@
 //! The `mackrl` program: train, evaluate, certify and reproduce.
 //!
 //! This crate holds no algorithm. `args` is what was typed, `commands` what it means, `reproduce` one command for each figure
-//! of the paper, `plot` the drawing of its results, `training_loop` the loop around a trainer, `run_folder` what a run leaves on disk,
+//! of the paper, `plot` the drawing of its results, `replay` the looking into recorded episodes, `training_loop` the loop around a trainer,
+//! `run_folder` what a run leaves on disk, `provenance` where a result comes from,
 //! `progress` what a person sees while waiting, `signals` how a person stops waiting, `failure` the one place that turns errors into exit codes. Data go to stdout, everything else to stderr.
 
 mod args;
@@ -11,6 +12,8 @@ mod failure;
 mod output;
 mod plot;
 mod progress;
+mod provenance;
+mod replay;
 mod reproduce;
 mod run_folder;
 mod signals;
@@ -31,6 +34,8 @@ fn main() -> ExitCode {
         Command::ExecuteAgent(args) => commands::execute_agent::run(&args),
         Command::Reproduce(args) => commands::reproduce::run(&args),
         Command::Play(args) => commands::play::run(&args),
+        Command::Replay(args) => commands::replay::run(&args),
+        Command::Explain(args) => commands::explain::run(&args),
         Command::Maps(args) => commands::maps::run(&args),
         Command::Config(args) => commands::config::run(&args),
         Command::Bench(args) => commands::bench::run(&args),

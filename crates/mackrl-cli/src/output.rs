@@ -1,9 +1,14 @@
 //! Writing results to stdout.
 
-use std::io::{self, Write};
+use std::{
+    io::{self, Write},
+    path::Path,
+};
 
 use anyhow::Context;
 use serde::Serialize;
+
+use crate::provenance::Provenance;
 
 /// Writes `text` to stdout.
 pub(crate) fn print(text: &str) -> anyhow::Result<()> {
@@ -18,6 +23,19 @@ pub(crate) fn print(text: &str) -> anyhow::Result<()> {
 pub(crate) fn print_json(value: &impl Serialize) -> anyhow::Result<()> {
     let json = serde_json::to_string_pretty(value).context("cannot write the result as JSON")?;
     print(&(json + "\n"))
+}
+
+/// Writes a file that was asked for by name.
+pub(crate) fn write_file(file: &Path, content: &[u8]) -> anyhow::Result<()> {
+    std::fs::write(file, content).with_context(|| format!("cannot write {}", file.display()))
+}
+
+/// A result with where it comes from; as JSON, one object.
+#[derive(Debug, Serialize)]
+pub(crate) struct Sourced<T> {
+    pub(crate) provenance: Provenance,
+    #[serde(flatten)]
+    pub(crate) result: T,
 }
 
 /// Lays out rows of cells in columns: the first to the left, the others to the right. The first row is the heading.

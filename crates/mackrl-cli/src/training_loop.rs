@@ -4,7 +4,7 @@ use std::{path::PathBuf, time::Instant};
 
 use mackrl::{
     config::Config,
-    training::{Checkpoint, Trainer},
+    training::{Checkpoint, MetricRow, Trainer},
 };
 use serde::Serialize;
 
@@ -12,6 +12,7 @@ use crate::{
     failure::Failure,
     output,
     progress::{Progress, Standing},
+    provenance::Provenance,
     run_folder::{RunFolder, Status},
     signals::StopRequest,
 };
@@ -45,6 +46,7 @@ pub(crate) trait Training {
 pub(crate) struct Reporting {
     trainer: Trainer,
     standing: Standing,
+    provenance: String,
 }
 
 impl Reporting {
@@ -56,7 +58,11 @@ impl Reporting {
             steps_env_total: config.run.steps_env,
             ..Standing::default()
         };
-        Self { trainer, standing }
+        Self {
+            trainer,
+            standing,
+            provenance: Provenance::of_run(config).id,
+        }
     }
 }
 
@@ -74,9 +80,13 @@ impl Training for Reporting {
             self.standing.battle_won_mean = latest("test_battle_won_mean", battle_won_mean);
             self.standing.delegation_rate = latest("mackrl/delegation_rate", delegation_rate);
         }
-        let metrics = row.map(|row| serde_json::to_string(&row).expect("numbers can be written"));
-        Ok(Update {
+        let metrics = row.map(|metrics| Row {
             metrics,
+            provenance: &self.provenance,
+        });
+        let json = |row: Row<'_>| serde_json::to_string(&row).expect("numbers can be written");
+        Ok(Update {
+            metrics: metrics.map(json),
             standing: self.standing,
         })
     }
@@ -100,6 +110,15 @@ impl Training for Reporting {
     fn weights(&self) -> Vec<u8> {
         self.trainer.weights()
     }
+}
+
+/// A line of `metrics.jsonl`.
+#[derive(Debug, Serialize)]
+struct Row<'a> {
+    #[serde(flatten)]
+    metrics: MetricRow,
+    /// Id of the provenance, which stands in `run.json`.
+    provenance: &'a str,
 }
 
 /// What a finished run says of itself.

@@ -60,6 +60,8 @@ fn help_teaches_every_command() {
         "reproduce figure6",
         "reproduce figure7",
         "play",
+        "replay",
+        "explain",
         "maps",
         "config",
         "bench",
@@ -322,41 +324,4 @@ fn a_broken_scenario_names_file_line_and_column() {
     ");
     let play = type_in_folder("play --map my.toml", folder.path()).fails(64);
     assert_eq!(check, play);
-}
-
-#[test]
-fn a_recorded_episode_plays_again_and_a_changed_one_is_found_out() {
-    let folder = tempfile::tempdir().expect("a folder for the story");
-    let story = |line: &str| type_in_folder(line, folder.path());
-    let played = story("play --map 2s3z --record one.json --svg one.svg").succeeds();
-    let replayed = story("play --replay one.json --svg two.svg").succeeds();
-    let end = |text: &str| {
-        text.split_once(": ")
-            .expect("a verb and a summary")
-            .1
-            .to_owned()
-    };
-    assert_eq!(end(&played), end(&replayed));
-    let read = |name: &str| std::fs::read(folder.path().join(name)).expect("a picture");
-    assert_eq!(read("one.svg"), read("two.svg"));
-    spoil(&folder, "one.json", "\"seed\":1", "\"seed\":2");
-    let error = story("play --replay one.json").fails(65);
-    assert!(
-        error.contains("the replay first differs after step"),
-        "{error}"
-    );
-    spoil(&folder, "one.json", "\"version\":1", "\"version\":7");
-    insta::assert_snapshot!(story("play --replay one.json").fails(65), @r#"error: one.json: format "mackrl-recording" version 7, expected "mackrl-recording" version 1"#);
-    std::fs::write(folder.path().join("one.json"), "[".repeat(10_000)).expect("writable");
-    let error = story("play --replay one.json").fails(65);
-    assert!(error.contains("no recording of mackrl"), "{error}");
-}
-
-#[test]
-fn a_step_after_the_end_is_a_usage_error() {
-    let error = type_in("play --map 3m --svg a.svg --step 999").fails(2);
-    assert!(
-        error.starts_with("error: --step 999 is after the end"),
-        "{error}"
-    );
 }

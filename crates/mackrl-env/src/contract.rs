@@ -1,7 +1,8 @@
 //! The test that every environment has to pass.
 
 use crate::{
-    Action, AgentId, Draw, EntityId, EntitySet, Environment, EpisodeKey, Observations, Stream,
+    Action, AgentId, Draw, EntityId, EntitySet, Environment, EpisodeKey, IllegalAction,
+    Observations, Stream,
 };
 
 /// Plays `episodes` episodes with random available actions and checks every promise of [`Environment`] and
@@ -176,14 +177,13 @@ fn check_illegal_action(
     actions[agent] = Action::new(action);
     let refused = environment.step(&actions, &mut observations.row_mut(0));
     let error = refused.expect_err("an unavailable action is refused");
+    let expected = IllegalAction {
+        agent: AgentId::new(agent),
+        action: Action::new(action),
+    };
     assert_eq!(
-        error.agent,
-        AgentId::new(agent),
-        "{place}: the wrong agent is named"
-    );
-    assert_eq!(
-        error.action,
-        Action::new(action),
-        "{place}: the wrong action is named"
+        error,
+        expected.into(),
+        "{place}: the wrong agent or action is named"
     );
 }

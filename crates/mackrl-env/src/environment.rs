@@ -76,6 +76,27 @@ pub struct IllegalAction {
     pub action: Action,
 }
 
+/// The world failed under the episode, which is void: nothing of it may be learnt from or counted.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("the episode is void: {reason}")]
+pub struct Interruption {
+    /// What failed, in words.
+    pub reason: String,
+    /// Whether a new episode may be tried; otherwise the world cannot be brought back.
+    pub can_be_repeated: bool,
+}
+
+/// Why a step was not played.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum StepError {
+    /// The policy chose what it must not; the world is unchanged.
+    #[error(transparent)]
+    IllegalAction(#[from] IllegalAction),
+    /// The world failed. Worlds that are computed never do; games in other processes may.
+    #[error(transparent)]
+    Interrupted(#[from] Interruption),
+}
+
 /// A world with N agents that share one reward.
 ///
 /// Every implementation passes [`crate::contract::check_environment`].
@@ -86,13 +107,15 @@ pub trait Environment: Send {
     /// What every agent knows before the first step.
     fn prior_knowledge(&self) -> Arc<dyn PriorKnowledge>;
 
-    /// Starts the episode named `key` and writes its first observations.
+    /// Starts the episode named `key` and writes its first observations, wherever the latest episode stands. If a world fails
+    /// at it, every agent is shown as dead, and the first step tells.
     fn reset(&mut self, key: EpisodeKey, out: &mut ObservationMut<'_>);
 
     /// Plays one step and writes the observations that follow it. Nothing is allocated.
     ///
     /// # Errors
-    /// [`IllegalAction`] names the first agent whose action was not available; the world is unchanged.
+    /// [`IllegalAction`] names the first agent whose action was not available; the world is unchanged. [`Interruption`] tells
+    /// that the episode is void; only `reset` may follow.
     ///
     /// # Panics
     /// If `actions` does not hold one action per agent.
@@ -100,7 +123,7 @@ pub trait Environment: Send {
         &mut self,
         actions: &[Action],
         out: &mut ObservationMut<'_>,
-    ) -> Result<TimeStep, IllegalAction>;
+    ) -> Result<TimeStep, StepError>;
 
     /// How the current episode stands.
     fn statistics(&self) -> EpisodeStatistics;

@@ -26,8 +26,8 @@ pub mod skirmish;
 
 pub use entity_set::EntitySet;
 pub use environment::{
-    Environment, EnvironmentSpec, EpisodeEnd, EpisodeStatistics, IllegalAction, PriorKnowledge,
-    TimeStep,
+    Environment, EnvironmentSpec, EpisodeEnd, EpisodeStatistics, IllegalAction, Interruption,
+    PriorKnowledge, StepError, TimeStep,
 };
 pub use ids::{Action, AgentId, EntityId};
 pub use observations::{KnownEntities, LocalView, ObservationMut, Observations};

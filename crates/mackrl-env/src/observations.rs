@@ -86,6 +86,25 @@ impl Observations {
         part(&self.state_bg, b, self.state_size)
     }
 
+    /// All numbers of environment `b`: what a row of them describes, the length of a row, and the rows.
+    #[must_use]
+    pub fn numbers(&self, b: usize) -> [(&'static str, usize, &[f32]); 3] {
+        let (observation, features) = (self.observation_size, self.entity_features);
+        [
+            (
+                "agent",
+                observation,
+                part(&self.observation_bno, b, self.agents * observation),
+            ),
+            (
+                "entity",
+                features,
+                part(&self.entity_bmf, b, self.entities * features),
+            ),
+            ("state", self.state_size, self.state(b)),
+        ]
+    }
+
     /// Who sees what in environment `b` \[N\].
     #[must_use]
     pub fn visible(&self, b: usize) -> &[EntitySet] {

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use crate::{
-    Action, AgentId, Draw, Environment, EpisodeKey, IllegalAction, Observations, Stream, TimeStep,
+    Action, AgentId, Draw, Environment, EpisodeKey, Observations, StepError, Stream, TimeStep,
 };
 
 /// Somebody who plays an environment for ever, without any skill.
@@ -50,8 +50,8 @@ impl RandomPlay {
     /// Plays one step, with observations, state and availability written, and begins a new episode where one ends.
     ///
     /// # Errors
-    /// [`IllegalAction`] if the environment refuses an action that it offered, against its contract.
-    pub fn step(&mut self) -> Result<TimeStep, IllegalAction> {
+    /// [`StepError`] if the environment fails, or refuses an action that it offered, against its contract.
+    pub fn step(&mut self) -> Result<TimeStep, StepError> {
         let key = self.key();
         for (agent, action) in self.actions.iter_mut().enumerate() {
             let view = self.observations.local_view(0, AgentId::new(agent));

@@ -7,12 +7,14 @@ use std::fmt::Write;
 
 use mackrl_env::{
     Action, AgentId, Draw, Environment, EpisodeKey, Observations, Stream, registry,
-    skirmish::{Skirmish, SkirmishSettings, UnitData, rules::Chance},
+    skirmish::{SIMULATOR_VERSION, Skirmish, SkirmishSettings, UnitData, rules::Chance},
 };
 
 /// State hashes of each map after 40 and 120 random steps, with either set of statistics.
 const GOLDEN: &str = include_str!("golden/skirmish_hashes.txt");
 const MARKS: [usize; 2] = [40, 120];
+/// The version of the simulator, and a hash of what it recorded.
+const RECORDED: (u32, u64) = (2, 0x285C_7BD2_023C_484C);
 
 /// Plays random available actions, episode after episode; `watch` is called after every step, counted from 1.
 fn play(skirmish: &mut Skirmish, steps: usize, mut watch: impl FnMut(&Skirmish, usize)) {
@@ -74,6 +76,18 @@ fn every_map_plays_as_recorded() {
         assert_eq!(found, recorded);
     }
     assert_eq!(GOLDEN.lines().count(), 1 + 2 * registry::map_names().len());
+}
+
+#[test]
+fn a_new_recording_is_a_new_version_of_the_simulator() {
+    let fingerprint = GOLDEN.bytes().fold(0xCBF2_9CE4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01B3)
+    });
+    assert_eq!(
+        (SIMULATOR_VERSION, fingerprint),
+        RECORDED,
+        "a new recording: raise SIMULATOR_VERSION, so that replays of the old one are refused, and note both here"
+    );
 }
 
 #[test]

@@ -136,7 +136,8 @@ impl Scene {
             behaviour: Behaviour::sampled(0.1),
         };
         self.actor
-            .act(&self.weights, situation, &mut self.actions_bn);
+            .act(&self.weights, situation, &mut self.actions_bn)
+            .expect("logits are finite");
     }
 }
 

@@ -38,7 +38,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             observations: &observations,
             behaviour,
         };
-        central.act(&weights, situation, &mut action_n);
+        central.act(&weights, situation, &mut action_n)?;
         // An agent alone is given nothing but its own view: no state, no other agent, no message.
         let own: Vec<Action> = (alone.iter_mut())
             .map(|(agent, executor)| {

@@ -50,7 +50,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 fn after_some_steps(
     world: &mut Skirmish,
     steps: usize,
-) -> Result<Observations, mackrl_env::IllegalAction> {
+) -> Result<Observations, mackrl_env::StepError> {
     let spec = world.spec().clone();
     let mut team = ScriptedTeam::new(ScriptedPolicy::Random, world);
     let mut observations = Observations::new(&spec, 1);

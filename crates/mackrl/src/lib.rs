@@ -4,7 +4,7 @@
 //! the concepts of the paper: [`common_knowledge`] finds what a group commonly knows, [`partition`] divides the team into
 //! pairs, [`hierarchy`] holds the controllers that act jointly or delegate, [`marginalisation`] gives the probability of the
 //! joint action over all paths through them, [`central_critic`] and [`learner`] learn from it, and [`decentralised`] runs
-//! the result one agent at a time and certifies that nothing was communicated.
+//! the result one agent at a time and certifies that nothing was communicated. [`statistics`] says what many runs say together.
 //!
 //! Axes, used at the end of tensor names: `T` time, `B` environment, `N` agent, `M` entity, `K` pair, `P` partition,
 //! `A` action, `C` column of a pair's table (delegate, then A·A joint actions), `F` feature, `G` state, `H` hidden.
@@ -24,12 +24,14 @@ mod parallel;
 pub mod partition;
 pub mod policy;
 mod real;
+pub mod replay;
 pub mod rollout;
+pub mod statistics;
 mod stopwatch;
 pub mod tabular;
 pub mod training;
 
-pub use error::Error;
+pub use error::{Broken, Error, Moment, NotFinite};
 pub use real::Real;
 pub use stopwatch::{Phase, Stopwatch};
 

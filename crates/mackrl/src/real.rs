@@ -90,6 +90,7 @@ macro_rules! real {
             fn mul_add(self, factor: Self, term: Self) -> Self {
                 self.mul_add(factor, term)
             }
+            #[inline(always)]
             fn is_finite(self) -> bool {
                 self.is_finite()
             }

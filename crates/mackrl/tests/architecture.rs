@@ -33,7 +33,7 @@ const NAMES: [&str; 9] = [
     "EntityId",
     "EntitySet",
     "EpisodeKey",
-    "IllegalAction",
+    "StepError",
     "Stream",
     "random",
 ];

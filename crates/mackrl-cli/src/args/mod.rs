@@ -3,18 +3,23 @@
 mod bench;
 mod configuration;
 mod play;
+mod replay;
 mod runs;
 
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
-use crate::reproduce::{figure5::Figure5Options, figure6::Figure6Options, figure7::Figure7Options};
+use crate::{
+    provenance::CODE,
+    reproduce::{figure5::Figure5Options, figure6::Figure6Options, figure7::Figure7Options},
+};
 pub(crate) use bench::{
     BenchArgs, BenchCommand, BenchEnvironmentArgs, BenchTrainArgs, BenchUpdateArgs,
 };
 pub(crate) use configuration::{ConfigurationArgs, read_scenario, with_scenario};
 pub(crate) use play::PlayArgs;
+pub(crate) use replay::{ExplainArgs, ReplayArgs};
 pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, TrainArgs};
 
 /// Teaches teams to coordinate without communicating, by acting jointly on what they commonly know.
@@ -25,7 +30,7 @@ pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, T
 /// Results go to stdout, everything else to stderr. Exit codes: 0 success, 1 a failed certificate, 2 usage, 64 a bad
 /// configuration, 65 bad data, 70 a defect of this program, 74 input or output, 75 stopped by a signal: go on with `mackrl resume`.
 #[derive(Debug, Parser)]
-#[command(name = "mackrl", version, max_term_width = 100)]
+#[command(name = "mackrl", version = CODE, max_term_width = 100)]
 pub(crate) struct Cli {
     #[command(subcommand)]
     pub(crate) command: Command,
@@ -41,6 +46,8 @@ pub(crate) enum Command {
     ExecuteAgent(ExecuteAgentArgs),
     Reproduce(ReproduceArgs),
     Play(PlayArgs),
+    Replay(ReplayArgs),
+    Explain(ExplainArgs),
     Maps(MapsArgs),
     Config(ConfigArgs),
     Bench(BenchArgs),

@@ -7,19 +7,18 @@ use mackrl_env::skirmish::scripted::ScriptedPolicy;
 
 use crate::args::runs::ThreadsArgs;
 
-/// Play with a scripted team, and report, record, replay or draw what happens
+/// Play with a scripted team, and report or keep what happens
 ///
 /// Prints the mean and the standard error of battles won, return, episode length, and allies and enemies lost. Scripted agents
 /// decide from their own local views, as trained ones do. The number of threads changes the speed and nothing else.
 ///
-/// --record writes one episode as JSON: the map, the settings, the seed, every action and a hash of the state after every
-/// step. --replay plays such a file again and says where it first differs, if it does. --svg draws one step of it.
+/// --save-replay keeps the first episode: the map, the settings, the seed, every action and a hash of the state after every
+/// step. `mackrl replay` shows it as a page, a picture or a film.
 ///
 /// Examples:
 ///   mackrl play --map 2s3z --policy focus-fire --episodes 1000 --json
 ///   mackrl play --map all --policy all
-///   mackrl play --map ./my.toml --policy kite --svg battle.svg --step 12
-///   mackrl play --map 3m --record episode.json && mackrl play --replay episode.json
+///   mackrl play --map ./my.toml --policy kite --save-replay battle.replay.gz
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct PlayArgs {
@@ -50,22 +49,9 @@ pub(crate) struct PlayArgs {
     #[arg(long)]
     pub(crate) json: bool,
 
-    /// Write the first episode to this file, and play no other
-    #[arg(long, value_name = "FILE", help_heading = "One episode")]
-    pub(crate) record: Option<PathBuf>,
-
-    /// Play what this file records; the map, the settings and the seed are those of the file
-    #[arg(long, value_name = "FILE", help_heading = "One episode",
-          conflicts_with_all = ["record", "map", "policy", "episodes", "seed", "set", "threads"])]
-    pub(crate) replay: Option<PathBuf>,
-
-    /// Draw one step of the first episode to this file (as an image if it ends in .png), and play no other
-    #[arg(long, value_name = "FILE", help_heading = "One episode")]
-    pub(crate) svg: Option<PathBuf>,
-
-    /// Step to draw: 0 is the start [default: half of the episode]
-    #[arg(long, value_name = "T", requires = "svg", help_heading = "One episode")]
-    pub(crate) step: Option<usize>,
+    /// Play the first episode alone, and write it to this file as a replay
+    #[arg(long, value_name = "FILE", conflicts_with = "episodes")]
+    pub(crate) save_replay: Option<PathBuf>,
 }
 
 /// A scripted policy, or all of them.

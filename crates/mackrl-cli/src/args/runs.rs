@@ -54,9 +54,10 @@ pub(crate) struct ResumeArgs {
 
 /// Play greedy episodes with a trained team and report how it does
 ///
-/// Prints the mean and the standard error of battles won, return and episode length.
+/// Prints the mean and the standard error of battles won, return and episode length. --save-replays keeps some of the episodes,
+/// with all that the controllers computed; `mackrl replay` and `mackrl explain` show them.
 ///
-/// Example: mackrl evaluate runs/3m-mackrl-seed1 --episodes 320 --json
+/// Example: mackrl evaluate runs/3m-mackrl-seed1 --episodes 320 --save-replays 3 --json
 #[derive(Debug, Args)]
 pub(crate) struct EvaluateArgs {
     /// Run folder that `mackrl train` wrote
@@ -70,6 +71,10 @@ pub(crate) struct EvaluateArgs {
     /// Seed of the episodes [default: the run's own]
     #[arg(long, value_name = "S")]
     pub(crate) seed: Option<u64>,
+
+    /// Keep the first N of the episodes as DIR/replays/seedS-episodeI.replay.gz
+    #[arg(long, value_name = "N", default_value = "0", hide_default_value = true)]
+    pub(crate) save_replays: usize,
 
     #[command(flatten)]
     pub(crate) threads: ThreadsArgs,

@@ -14,17 +14,29 @@ use mackrl::{
         read_weights,
     },
 };
-use serde::Serialize;
 use serde_json::Value;
 
-use crate::{args::CertifyArgs, failure::Failure, output, reproduce::Meter, run_folder::Run};
+use crate::{
+    args::CertifyArgs,
+    failure::Failure,
+    output::{self, Sourced},
+    provenance::{Choice, Judgement, Provenance},
+    reproduce::Meter,
+    run_folder::Run,
+};
 
 /// Compares a trained team's central run with its agents in processes of their own, and fails if anything differs.
 pub(crate) fn run(args: &CertifyArgs) -> anyhow::Result<()> {
     let run = Run::open(&args.run)?;
     let certificate = certify(&args.run, &run, args)
         .with_context(|| format!("cannot certify {}", args.run.display()))?;
-    print(&certificate, args.json)
+    let judgement = Judgement {
+        actions: Choice::SampledAndGreedy,
+        episodes: args.episodes.get(),
+    };
+    let seed = args.seed.unwrap_or(run.config.run.seed);
+    let provenance = Provenance::of_weights(&run.config, &run.weights, seed, judgement);
+    print(provenance, &certificate, args.json)
 }
 
 fn certify(folder: &Path, run: &Run, args: &CertifyArgs) -> anyhow::Result<Certificate> {
@@ -118,11 +130,14 @@ impl Drop for AgentProcess {
     }
 }
 
-/// Prints a certificate, a JSON object with `mismatches` and what else was counted, and fails if there are any.
-fn print(certificate: &impl Serialize, json: bool) -> anyhow::Result<()> {
+/// Prints a certificate, a JSON object with its provenance, `mismatches` and what else was counted, and fails if there are any.
+fn print(provenance: Provenance, certificate: &Certificate, json: bool) -> anyhow::Result<()> {
     let value = serde_json::to_value(certificate)?;
     if json {
-        output::print_json(certificate)?;
+        output::print_json(&Sourced {
+            provenance,
+            result: certificate,
+        })?;
     } else {
         output::print(&table(&value))?;
     }

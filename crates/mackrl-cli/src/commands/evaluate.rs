@@ -1,11 +1,24 @@
 //! `mackrl evaluate`: how well a trained team plays.
 
+use std::path::Path;
+
 use anyhow::Context;
-use mackrl::training::evaluate;
-use serde::Serialize;
+use mackrl::{
+    policy::Behaviour,
+    replay::record_policy,
+    training::{Evaluation, evaluate},
+};
+use mackrl_env::{EpisodeKey, Stream};
 use serde_json::Value;
 
-use crate::{args::EvaluateArgs, output, run_folder::Run};
+use crate::{
+    args::EvaluateArgs,
+    failure::Failure,
+    output::{self, Sourced},
+    provenance::{Choice, Judgement, Provenance},
+    reproduce::Meter,
+    run_folder::Run,
+};
 
 /// Plays greedy episodes with a trained team and prints how it did.
 pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
@@ -13,15 +26,51 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     let seed = args.seed.unwrap_or(run.config.run.seed);
     let episodes = args.episodes.get();
     let threads = args.threads.count();
+    if args.save_replays > episodes {
+        let message = format!(
+            "--save-replays {} of {episodes} episodes, expected at most --episodes",
+            args.save_replays
+        );
+        return Err(Failure::Usage { message }.into());
+    }
     let evaluation = evaluate(&run.config, &run.weights, episodes, seed, threads)
         .with_context(|| format!("cannot evaluate {}", args.run.display()))?;
-    print(&evaluation, args.json)
+    save_replays(&args.run, &run, seed, args.save_replays)?;
+    let judgement = Judgement {
+        actions: Choice::Greedy,
+        episodes,
+    };
+    let provenance = Provenance::of_weights(&run.config, &run.weights, seed, judgement);
+    print(provenance, &evaluation, args.json)
 }
 
-/// Prints an evaluation: a JSON object of numbers, or a table in which each mean stands beside its standard error.
-fn print(evaluation: &impl Serialize, json: bool) -> anyhow::Result<()> {
+/// Plays the first `count` of the episodes again and keeps them.
+fn save_replays(folder: &Path, run: &Run, seed: u64, count: usize) -> anyhow::Result<()> {
+    if count == 0 {
+        return Ok(());
+    }
+    let replays = folder.join("replays");
+    std::fs::create_dir_all(&replays)
+        .with_context(|| format!("cannot create {}", replays.display()))?;
+    let meter = Meter::new("replays");
+    for episode in 0..count {
+        let key = EpisodeKey::new(seed, Stream::Evaluation, episode as u64);
+        let replay = record_policy(&run.config, &run.weights, Behaviour::GREEDY, key)
+            .with_context(|| format!("cannot make a replay of {}", folder.display()))?;
+        let file = replays.join(format!("seed{seed}-episode{episode}.replay.gz"));
+        output::write_file(&file, &replay.to_bytes())?;
+        meter.report(episode + 1, count);
+    }
+    Ok(())
+}
+
+/// Prints an evaluation: a JSON object of numbers and their provenance, or a table in which each mean stands beside its standard error.
+fn print(provenance: Provenance, evaluation: &Evaluation, json: bool) -> anyhow::Result<()> {
     if json {
-        output::print_json(evaluation)
+        output::print_json(&Sourced {
+            provenance,
+            result: evaluation,
+        })
     } else {
         output::print(&table(&serde_json::to_value(evaluation)?))
     }

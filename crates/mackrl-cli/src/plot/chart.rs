@@ -81,7 +81,6 @@ pub(crate) enum Mark {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Colour(pub(crate) u8, pub(crate) u8, pub(crate) u8);
 
-#[expect(dead_code, reason = "a palette is chosen as a whole")]
 impl Colour {
     /// Black of the Okabe–Ito palette.
     pub(crate) const BLACK: Self = Self(0x00, 0x00, 0x00);

@@ -17,8 +17,10 @@ mod scene;
 mod svg;
 mod text;
 
-pub(crate) use battle::{BattlePicture, Figure, Shot, Side};
+pub(crate) use battle::{BattlePicture, Figure, Lens, Link, Shot, Side};
 pub(crate) use chart::{Axis, Colour, Corner, LineChart, Mark, Point, Series};
+
+pub(crate) use png::Pixels;
 
 #[cfg(test)]
 mod tests;

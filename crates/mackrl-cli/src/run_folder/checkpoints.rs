@@ -25,7 +25,7 @@ use super::{
     manifest::{FORMAT, Fingerprint, Growing, Manifest},
     untrusted,
 };
-use crate::{bounded, failure::Failure};
+use crate::{bounded, failure::Failure, provenance::CODE};
 
 const TENSORS: &str = "tensors.safetensors";
 const COUNTERS: &str = "counters.json";
@@ -96,7 +96,7 @@ fn make(
     ];
     let manifest = Manifest {
         format: FORMAT,
-        version: env!("CARGO_PKG_VERSION").to_owned(),
+        code: CODE.to_owned(),
         config,
         metrics,
         files: contents

@@ -8,6 +8,8 @@ use std::{
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use crate::provenance::hexadecimal;
+
 /// Version of the manifest; it changes when an older program could not read it.
 pub(super) const FORMAT: u64 = 1;
 
@@ -73,7 +75,7 @@ impl Growing {
         let hash = self.hasher.clone().finalize();
         Fingerprint {
             bytes: self.bytes,
-            sha256: hash.iter().map(|byte| format!("{byte:02x}")).collect(),
+            sha256: hexadecimal(&hash),
         }
     }
 }
@@ -83,8 +85,8 @@ impl Growing {
 #[serde(deny_unknown_fields)]
 pub(super) struct Manifest {
     pub(super) format: u64,
-    /// Version of the program that wrote it.
-    pub(super) version: String,
+    /// Version of the code that wrote it, as `provenance::CODE`.
+    pub(super) code: String,
     /// The configuration, which never changes.
     pub(super) config: Fingerprint,
     /// The metrics so far; what stands behind them is cut off when the run continues.

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! DIR/config.toml           everything that determines the result; written before the first step
-//! DIR/run.json              command line, version, status
+//! DIR/run.json              command line, provenance, status
 //! DIR/metrics.jsonl         one JSON object a line
 //! DIR/checkpoints/          the latest few, from which the run continues
 //! DIR/weights.safetensors   the policy and the critic; written at the end
@@ -34,7 +34,7 @@ use mackrl::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::{bounded, failure::Failure};
+use crate::{bounded, failure::Failure, provenance::Provenance};
 use checkpoints::Surroundings;
 use disk::{Disk, RealDisk, cannot, cannot_write};
 use event_file::EventFile;
@@ -62,15 +62,15 @@ pub(crate) enum Status {
     Failed,
 }
 
-/// What `run.json` tells: facts that do not determine the result.
+/// What `run.json` tells: where the result comes from, and facts that do not determine it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct RunRecord {
     /// The command line, word by word.
     command: Vec<String>,
-    /// Version of this program.
-    version: String,
-    /// Seed of the run, also in `config.toml`.
-    seed: u64,
+    /// Where the run's results come from: one entry, or one for each version of this program that went on with it, in their
+    /// order.
+    #[serde(default)]
+    provenance: Vec<Provenance>,
     /// Threads in use, which change no result.
     threads: usize,
     status: Status,
@@ -196,12 +196,15 @@ impl RunFolder {
         let metrics = open_metrics(&path.join(METRICS), metrics_so_far.bytes())?;
         let mut record = read_record(path).unwrap_or_else(|| RunRecord {
             command: std::env::args().collect(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            seed: config.run.seed,
+            provenance: Vec::new(),
             threads,
             status: Status::Running,
         });
         record.threads = threads;
+        let provenance = Provenance::of_run(config);
+        if !record.provenance.contains(&provenance) {
+            record.provenance.push(provenance);
+        }
         let mut folder = Self {
             path: path.to_owned(),
             disk: Box::new(RealDisk),
@@ -285,6 +288,14 @@ impl RunFolder {
     fn replace(&self, name: &str, content: &[u8]) -> anyhow::Result<()> {
         disk::replace(&*self.disk, &self.path.join(name), content)
     }
+}
+
+/// Puts `content` at `path`: whoever reads there, and whenever power is lost, finds the old content or the new.
+///
+/// # Errors
+/// Path, bytes and what the operating system says; the file that was there is intact then.
+pub(crate) fn replace(path: &Path, content: &[u8]) -> anyhow::Result<()> {
+    disk::replace(&RealDisk, path, content)
 }
 
 /// Takes the folder for this process until the file is closed; the operating system closes it, however the process ends.

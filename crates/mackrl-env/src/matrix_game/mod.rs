@@ -16,7 +16,7 @@ mod world;
 pub use information::{
     CommonKnowledge, Deal, DealtCards, InvalidProbability, Observation, ObservationDistribution,
 };
-pub use payoffs::{ACTIONS, Matrix, Payoffs, payoff};
+pub use payoffs::{ACTIONS, Matrix, Payoffs, payoff, payoff_text};
 pub use world::{MatrixGame, MatrixGameSettings};
 
 /// N: agents of the game.

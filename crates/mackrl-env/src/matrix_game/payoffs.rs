@@ -80,6 +80,20 @@ pub fn payoff(payoffs: Payoffs, matrix: Matrix, first: usize, second: usize) -> 
     f64::from(PRINTED[matrix.index()][first][second]) / 5.0
 }
 
+/// Both matrices as text: a line for each row, first those of A, then those of B.
+#[must_use]
+pub fn payoff_text(payoffs: Payoffs) -> String {
+    let mut text = String::new();
+    for matrix in Matrix::ALL {
+        for first in 0..ACTIONS {
+            let row = (0..ACTIONS).map(|second| payoff(payoffs, matrix, first, second).to_string());
+            text.push_str(&row.collect::<Vec<_>>().join(" "));
+            text.push('\n');
+        }
+    }
+    text
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

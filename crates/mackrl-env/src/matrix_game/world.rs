@@ -15,7 +15,7 @@ use super::{
 use crate::{
     Action, AgentId, Draw, EntityId, EntitySet, Environment, EnvironmentSpec, EpisodeEnd,
     EpisodeKey, EpisodeStatistics, IllegalAction, KnownEntities, ObservationMut, PriorKnowledge,
-    TimeStep, declare_settings, settings::Accepts,
+    StepError, TimeStep, declare_settings, settings::Accepts,
 };
 
 const ENTITIES: usize = AGENTS + 1;
@@ -145,14 +145,14 @@ impl Environment for MatrixGame {
         &mut self,
         actions: &[Action],
         out: &mut ObservationMut<'_>,
-    ) -> Result<TimeStep, IllegalAction> {
+    ) -> Result<TimeStep, StepError> {
         let &[first, second] = actions else {
             panic!("{} actions for {AGENTS} agents", actions.len());
         };
         for (agent, action) in [first, second].into_iter().enumerate() {
             if action.index() >= ACTIONS {
                 let agent = AgentId::new(agent);
-                return Err(IllegalAction { agent, action });
+                return Err(IllegalAction { agent, action }.into());
             }
         }
         let (payoffs, matrix) = (self.settings.payoffs, self.cards.matrix);
@@ -314,7 +314,11 @@ mod tests {
             &mut observations.row_mut(0),
         );
         let refused = game.step(&[0, 5].map(Action::new), &mut observations.row_mut(0));
-        assert_eq!(refused.unwrap_err().agent, AgentId::new(1));
+        let expected = IllegalAction {
+            agent: AgentId::new(1),
+            action: Action::new(5),
+        };
+        assert_eq!(refused.unwrap_err(), expected.into());
         assert!(!game.statistics().battle_won);
         let best = match game.cards().matrix {
             Matrix::A => [4, 4],

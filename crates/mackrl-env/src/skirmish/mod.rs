@@ -5,6 +5,7 @@
 //! Unit statistics and maps are data ([`unit_types`], [`scenario`]), read from the files under `units/` and `maps/`.
 
 pub mod custom;
+mod encounter;
 pub mod error;
 mod face;
 mod paths;
@@ -15,8 +16,14 @@ mod settings;
 pub mod terrain;
 pub mod unit_types;
 
+pub use encounter::Encounter;
 pub use error::SkirmishError;
-pub use face::{BattleTally, Skirmish, SkirmishKnowledge};
+pub use face::{BattleTally, Face, Skirmish, SkirmishKnowledge};
 pub use scenario::Scenario;
 pub use settings::{Compatibility, SkirmishSettings};
 pub use unit_types::UnitData;
+
+/// Version of the rules and of their data: one key and the same actions give the same battle in every program with this number.
+///
+/// It is raised whenever `tests/golden/skirmish_hashes.txt` is recorded anew.
+pub const SIMULATOR_VERSION: u32 = 2;

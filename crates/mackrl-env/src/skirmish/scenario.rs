@@ -172,12 +172,18 @@ pub fn map_names() -> Vec<&'static str> {
     MAPS.iter().map(|(name, _)| *name).collect()
 }
 
+/// The file of the shipped map called `name`; `None` if there is no such map.
+#[must_use]
+pub fn map_text(name: &str) -> Option<&'static str> {
+    let (_, text) = MAPS.iter().find(|(shipped, _)| *shipped == name)?;
+    Some(text)
+}
+
 impl Scenario {
     /// The shipped map called `name` with the given statistics; `None` if there is no such map.
     #[must_use]
     pub fn shipped(name: &str, units: &UnitTypes) -> Option<Result<Self, SkirmishError>> {
-        let (name, file) = MAPS.iter().find(|(shipped, _)| *shipped == name)?;
-        Some(Self::parse(name, file, units))
+        Some(Self::parse(name, map_text(name)?, units))
     }
 
     /// Reads a map file.

@@ -27,6 +27,9 @@ declare_settings! {
         units: UnitData = UnitData::Liberty, Accepts::OneOf(&["liberty", "lotv"]);
         /// Which of SMAC's peculiarities are kept: all (absolute rewards, swapped one-hot types of enemies) or none.
         compat: Compatibility = Compatibility::Smac, Accepts::OneOf(&["smac", "clean"]);
+        /// Map units by which a unit starts beside its place on the map, at most, along each axis; drawn anew for every episode. Not
+        /// in SMAC, where the engine places units: see `DEVIATIONS.md`.
+        spawn_scatter: f32 = 0.5, Accepts::within(0.0, 4.0);
         /// Map units that a move is ordered to go. Half of it is how far ahead availability looks.
         move_amount: f32 = 2.0, Accepts::above_within(0.0, 32.0);
         /// Map units within which an agent sees, centre to centre, exclusive.

@@ -23,6 +23,17 @@ pub enum UnitData {
     Lotv,
 }
 
+impl UnitData {
+    /// The file of `units/` that states them.
+    #[must_use]
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::Liberty => include_str!("../../../../units/liberty.toml"),
+            Self::Lotv => include_str!("../../../../units/lotv.toml"),
+        }
+    }
+}
+
 /// All unit types and the constants that they share.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -255,12 +266,12 @@ impl UnitTypes {
         type Parsed = OnceLock<Result<Arc<UnitTypes>, SkirmishError>>;
         static LIBERTY: Parsed = OnceLock::new();
         static LOTV: Parsed = OnceLock::new();
-        let (parsed, text) = match data {
-            UnitData::Liberty => (&LIBERTY, include_str!("../../../../units/liberty.toml")),
-            UnitData::Lotv => (&LOTV, include_str!("../../../../units/lotv.toml")),
+        let parsed = match data {
+            UnitData::Liberty => &LIBERTY,
+            UnitData::Lotv => &LOTV,
         };
         parsed
-            .get_or_init(|| Self::parse(text).map(Arc::new))
+            .get_or_init(|| Self::parse(data.text()).map(Arc::new))
             .clone()
     }
 

@@ -3,7 +3,7 @@
 use mackrl_env::{Action, AgentId, EnvironmentSpec};
 
 use crate::{
-    Phase, Stopwatch,
+    NotFinite, Phase, Stopwatch,
     hierarchy::{
         Sampler,
         agent_controller::{AgentController, forced_action, is_alive},
@@ -11,8 +11,11 @@ use crate::{
         initialisation_key,
         statistics::entropy,
     },
-    nn::ParameterLayout,
-    policy::{Actor, ControllerId, ControllerInput, Policy, Recording, Situation, Tally, Weights},
+    nn::{Named, ParameterLayout},
+    policy::{
+        Actor, AgentThought, ControllerId, ControllerInput, Policy, Recording, Situation, Tally,
+        Thought, Weights,
+    },
 };
 
 /// The policy of Central-V.
@@ -98,7 +101,12 @@ struct CentralVActor {
 
 impl CentralVActor {
     /// Advances the controllers of all living agents; the dead have their one action.
-    fn run(&mut self, weights: &Weights, situation: Situation<'_>, actions_bn: &mut [Action]) {
+    fn run(
+        &mut self,
+        weights: &Weights,
+        situation: Situation<'_>,
+        actions_bn: &mut [Action],
+    ) -> Result<(), NotFinite> {
         let Self {
             controller,
             memory,
@@ -125,6 +133,14 @@ impl CentralVActor {
         }
         let exploration = situation.behaviour.exploration;
         memory.run(controller.controller(), &weights.agents, exploration);
+        memory.check_logits(|row| {
+            let (b, agent) = rows[row];
+            [
+                ("episode", b),
+                ("step", situation.step),
+                ("agent", agent.index()),
+            ]
+        })
     }
 }
 
@@ -137,8 +153,13 @@ impl Actor for CentralVActor {
         self.entropy = (0.0, 0.0);
     }
 
-    fn act(&mut self, weights: &Weights, situation: Situation<'_>, actions_bn: &mut [Action]) {
-        self.run(weights, situation, actions_bn);
+    fn act(
+        &mut self,
+        weights: &Weights,
+        situation: Situation<'_>,
+        actions_bn: &mut [Action],
+    ) -> Result<(), NotFinite> {
+        self.run(weights, situation, actions_bn)?;
         if self.recording == Recording::ForLearning {
             situation
                 .playing
@@ -165,6 +186,7 @@ impl Actor for CentralVActor {
             }
         }
         self.stopwatch.lap(Phase::Act);
+        Ok(())
     }
 
     fn backward(&mut self, weights: &Weights, weight_bt: &[Vec<f32>], gradient: &mut [f32]) -> f64 {
@@ -192,6 +214,14 @@ impl Actor for CentralVActor {
         &mut self.stopwatch
     }
 
+    fn activations(&self) -> Vec<Named<'_, f32>> {
+        self.memory.activations()
+    }
+
+    fn gradients(&self) -> Vec<Named<'_, f32>> {
+        self.memory.gradients()
+    }
+
     fn controller_inputs(&self, b: usize) -> Vec<ControllerInput> {
         let rows = self
             .rows
@@ -200,5 +230,21 @@ impl Actor for CentralVActor {
             .filter(|(_, (row_b, _))| *row_b == b);
         rows.map(|(row, &(_, agent))| self.memory.input(row, ControllerId::AgentController(agent)))
             .collect()
+    }
+
+    fn thought(&mut self, b: usize, _: Situation<'_>, action_n: &[Action]) -> Thought {
+        let rows = self.rows.iter().enumerate();
+        let own = rows.filter(|(_, (row_b, _))| *row_b == b);
+        let mut thought = Thought::default();
+        for (row, &(_, agent)) in own {
+            let (log_p_a, taken) = (self.memory.log_p(row), action_n[agent.index()]);
+            thought.log_p += f64::from(log_p_a[taken.index()]);
+            thought
+                .agents
+                .push(AgentThought::new(agent, log_p_a, taken));
+        }
+        // There is one way only.
+        thought.log_p_path = thought.log_p;
+        thought
     }
 }

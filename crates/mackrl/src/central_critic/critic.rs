@@ -4,10 +4,11 @@ use mackrl_env::EpisodeKey;
 
 use super::{ReturnSettings, lambda_returns};
 use crate::{
-    Error,
+    NotFinite,
     nn::{
-        FeedForward, FeedForwardTrace, FeedForwardWeights, Moments, NetworkSizes, Optimiser,
-        OptimiserKind, ParameterLayout, clip_gradient_norm, first_not_finite,
+        BrokenStep, FeedForward, FeedForwardTrace, FeedForwardWeights, Moments, Named,
+        NetworkSizes, Optimiser, OptimiserKind, ParameterLayout, Stepped, clip_gradient_norm,
+        first_not_finite,
     },
     rollout::Episode,
 };
@@ -74,6 +75,10 @@ pub struct CentralCritic {
     trace: FeedForwardTrace<f32>,
     updates: u64,
     updates_at_refresh: u64,
+    /// The state before the latest sweep.
+    before: CriticState,
+    /// What the latest sweep keeps of each episode.
+    sweeps: Vec<Sweep>,
 }
 
 /// What the sweep keeps of one episode.
@@ -97,15 +102,23 @@ impl CentralCritic {
             outputs: 1,
         };
         let mut layout = ParameterLayout::new();
-        let network = FeedForward::new(&mut layout, "critic", sizes);
+        let network = FeedForward::new(&mut layout, super::CRITIC, sizes);
         let mut parameters = vec![0.0; layout.len()];
         network.initialise(key, &mut parameters);
+        let optimiser = Optimiser::new(settings.optimiser, parameters.len());
         Self {
             settings,
             weights: network.weights(&parameters),
             target_parameters: parameters.clone(),
             target_weights: network.weights(&parameters),
-            optimiser: Optimiser::new(settings.optimiser, parameters.len()),
+            before: CriticState {
+                parameters: parameters.clone(),
+                target_parameters: parameters.clone(),
+                moments: optimiser.moments().clone(),
+                updates: 0,
+                updates_at_refresh: 0,
+            },
+            optimiser,
             gradient: vec![0.0; parameters.len()],
             trace: FeedForwardTrace::new(sizes),
             layout,
@@ -113,6 +126,7 @@ impl CentralCritic {
             parameters,
             updates: 0,
             updates_at_refresh: 0,
+            sweeps: Vec::new(),
         }
     }
 
@@ -168,17 +182,42 @@ impl CentralCritic {
     /// `A_t = r_t + γ V(s_{t+1}) − V(s_t)`, with V = 0 after the end (eq. 6).
     ///
     /// # Errors
-    /// [`Error::NotFinite`] if a gradient is not finite; parameters are then as after the step before.
+    /// [`NotFinite`] if a value, a λ-return, a gradient, or a number after a step is not finite; the critic is then as it was
+    /// before the sweep.
     pub fn sweep(
         &mut self,
         episodes: &[&Episode],
         advantage_bt: &mut Vec<Vec<f32>>,
-    ) -> Result<CriticReport, Error> {
+    ) -> Result<CriticReport, NotFinite> {
+        self.save();
+        let mut sweeps = std::mem::take(&mut self.sweeps);
+        let swept = self.sweep_back(episodes, &mut sweeps);
+        advantage_bt.clear();
+        advantage_bt.extend(
+            sweeps
+                .iter_mut()
+                .map(|sweep| std::mem::take(&mut sweep.advantage_t)),
+        );
+        self.sweeps = sweeps;
+        if swept.is_err() {
+            self.undo();
+        }
+        swept
+    }
+
+    /// Becomes again as it was before the latest sweep.
+    pub fn undo(&mut self) {
+        self.restore(self.before.clone());
+    }
+
+    fn sweep_back(
+        &mut self,
+        episodes: &[&Episode],
+        sweeps: &mut Vec<Sweep>,
+    ) -> Result<CriticReport, NotFinite> {
         self.refresh_target_if_due();
-        let mut sweeps: Vec<Sweep> = episodes
-            .iter()
-            .map(|episode| self.prepare_sweep(episode))
-            .collect();
+        sweeps.clear();
+        sweeps.extend(episodes.iter().map(|episode| self.prepare_sweep(episode)));
         let longest = episodes
             .iter()
             .map(|episode| episode.steps())
@@ -186,15 +225,55 @@ impl CentralCritic {
             .unwrap_or(0);
         let mut total = CriticReport::default();
         for t in (0..longest).rev() {
-            let report = self.update(t, episodes, &mut sweeps)?;
+            let report = self.update(t, episodes, sweeps)?;
             total.loss += report.loss / longest as f64;
             total.gradient_norm += report.gradient_norm / longest as f64;
             total.td_error_abs += report.td_error_abs / longest as f64;
             total.target_mean += report.target_mean / longest as f64;
         }
-        advantage_bt.clear();
-        advantage_bt.extend(sweeps.into_iter().map(|sweep| sweep.advantage_t));
         Ok(total)
+    }
+
+    /// The λ-returns of the latest sweep, one list for each episode.
+    #[must_use]
+    pub fn returns(&self) -> Vec<Named<'_, f32>> {
+        let returns = self.sweeps.iter().map(|sweep| &sweep.return_t[..]);
+        returns
+            .map(|return_t| Named::new("critic λ-returns", ["step", ""], 1, return_t))
+            .collect()
+    }
+
+    /// What the latest sweep computed for the last time step that it came to, in that order; a row is an episode.
+    #[must_use]
+    pub fn activations(&self) -> Vec<Named<'_, f32>> {
+        self.trace.named("critic")
+    }
+
+    /// The latest gradient, and the state after the latest step, tensor by tensor.
+    #[must_use]
+    pub fn step_numbers(&self) -> Vec<Named<'_, f32>> {
+        let mut named = self.layout.named("gradient of ", &self.gradient);
+        named.extend(named_step(&self.layout, &self.optimiser, &self.parameters));
+        named
+    }
+
+    /// Remembers the present state, without allocating.
+    fn save(&mut self) {
+        let Moments {
+            steps,
+            first,
+            second,
+        } = self.optimiser.moments();
+        let before = &mut self.before;
+        before.parameters.copy_from_slice(&self.parameters);
+        before
+            .target_parameters
+            .copy_from_slice(&self.target_parameters);
+        before.moments.steps = *steps;
+        before.moments.first.copy_from_slice(first);
+        before.moments.second.copy_from_slice(second);
+        before.updates = self.updates;
+        before.updates_at_refresh = self.updates_at_refresh;
     }
 
     fn refresh_target_if_due(&mut self) {
@@ -246,7 +325,7 @@ impl CentralCritic {
         t: usize,
         episodes: &[&Episode],
         sweeps: &mut [Sweep],
-    ) -> Result<CriticReport, Error> {
+    ) -> Result<CriticReport, NotFinite> {
         let gamma = self.settings.returns.gamma as f32;
         let live = || (0..episodes.len()).filter(|&b| t < episodes[b].steps());
         let rows = live().count();
@@ -264,54 +343,104 @@ impl CentralCritic {
             *value_gradient = 2.0 * error / rows as f32;
             sweep.advantage_t[t] = episodes[b].reward_t[t] + gamma * sweep.next_value - value;
             sweep.next_value = value;
-            report.loss += f64::from(error * error) / rows as f64;
+            report.loss += f64::from(error).powi(2) / rows as f64;
             report.td_error_abs += f64::from(error.abs()) / rows as f64;
             report.target_mean += f64::from(sweep.return_t[t]) / rows as f64;
+        }
+        // A sum of magnitudes is finite only if all of them are.
+        if !report.td_error_abs.is_finite() {
+            return Err(self.broken_error(t, &live().collect::<Vec<_>>(), sweeps));
         }
         self.gradient.fill(0.0);
         self.network
             .backward(&self.weights, &mut self.trace, &mut self.gradient);
-        if let Some(index) = first_not_finite(&self.gradient) {
-            return Err(not_finite(
-                &self.layout,
-                "gradient of",
-                index,
-                &self.gradient,
-                self.updates,
-            ));
-        }
         report.gradient_norm =
             clip_gradient_norm(&mut self.gradient, self.settings.gradient_norm_max);
-        let Self {
-            optimiser,
-            settings,
-            gradient,
-            parameters,
-            ..
-        } = self;
-        optimiser.step(settings.learning_rate, gradient, parameters);
+        self.step(report.gradient_norm)?;
         self.network.refresh(&self.parameters, &mut self.weights);
         self.updates += 1;
         Ok(report)
     }
+
+    /// Takes one step of the optimiser, if the gradient, of this norm, and everything after the step are finite.
+    fn step(&mut self, gradient_norm: f64) -> Result<(), NotFinite> {
+        let Self {
+            optimiser,
+            settings,
+            layout,
+            gradient,
+            parameters,
+            ..
+        } = self;
+        check_gradient(gradient_norm, layout, gradient)?;
+        optimiser
+            .propose(settings.learning_rate, gradient, parameters)
+            .map_err(|broken| broken_step(broken, layout, optimiser))?;
+        optimiser.accept(parameters);
+        Ok(())
+    }
+
+    /// The value or the λ-return that makes an error at time `t` infinite or NaN.
+    fn broken_error(&self, t: usize, live: &[usize], sweeps: &[Sweep]) -> NotFinite {
+        let of = |row: usize, b: usize| {
+            let (value, return_) = (self.trace.outputs()[row], sweeps[b].return_t[t]);
+            let numbers = [
+                ("λ-return", return_),
+                ("value", value),
+                ("error of the value", value - return_),
+            ];
+            let (name, number) = numbers.into_iter().find(|(_, x)| !x.is_finite())?;
+            let place = [("episode", b), ("step", t)];
+            Some(NotFinite::new(format!("critic.{name}"), &place, number))
+        };
+        let mut rows = live.iter().enumerate();
+        rows.find_map(|(row, &b)| of(row, b))
+            .expect("a sum that is not finite has such a term")
+    }
 }
 
-/// The error for a number that is not finite at `index` of a flat vector.
-pub(crate) fn not_finite(
+/// The state after an optimiser's latest step, accepted or not, tensor by tensor.
+pub(crate) fn named_step<'a>(
     layout: &ParameterLayout,
-    what: &str,
-    index: usize,
-    values: &[f32],
-    update: u64,
-) -> Error {
-    let tensor = layout
-        .tensor_at(index)
-        .map_or("unknown tensor", |tensor| tensor.name.as_str());
-    Error::NotFinite {
-        tensor: format!("{what} {tensor}"),
-        value: f64::from(values[index]),
-        update,
+    optimiser: &'a Optimiser<f32>,
+    parameters: &'a [f32],
+) -> Vec<Named<'a, f32>> {
+    let (moments, parameters) = optimiser.latest(parameters);
+    let mut named = Vec::new();
+    if !moments.first.is_empty() {
+        named.extend(layout.named("first moment of ", &moments.first));
     }
+    named.extend(layout.named("second moment of ", &moments.second));
+    named.extend(layout.named("after the step, ", parameters));
+    named
+}
+
+/// Refuses a gradient that is not finite. Its norm, a sum of squares in double precision, is finite only if all of it is.
+pub(crate) fn check_gradient(
+    norm: f64,
+    layout: &ParameterLayout,
+    gradient: &[f32],
+) -> Result<(), NotFinite> {
+    if norm.is_finite() {
+        return Ok(());
+    }
+    let index = first_not_finite(gradient).expect("a norm that is not finite has such a term");
+    Err(NotFinite::in_layout("gradient of", layout, index, gradient))
+}
+
+/// The number after a step for which the step is refused.
+pub(crate) fn broken_step(
+    broken: BrokenStep,
+    layout: &ParameterLayout,
+    optimiser: &Optimiser<f32>,
+) -> NotFinite {
+    let (moments, parameters) = optimiser.latest(&[]);
+    let (what, values) = match broken.what {
+        Stepped::FirstMoment => ("first moment of", moments.first.as_slice()),
+        Stepped::SecondMoment => ("second moment of", moments.second.as_slice()),
+        Stepped::Parameter => ("after the step,", parameters),
+    };
+    NotFinite::in_layout(what, layout, broken.index, values)
 }
 
 #[cfg(test)]
@@ -398,16 +527,5 @@ mod tests {
         let [first, second, third] = [targets(), targets(), targets()];
         assert_eq!(first, second);
         assert_ne!(second, third);
-    }
-
-    #[test]
-    fn a_reward_that_is_no_number_is_refused_with_the_name_of_a_tensor() {
-        let mut critic = critic(0.01, 3, false);
-        let mut episode = two_steps(EpisodeEnd::Terminated);
-        episode.reward_t[1] = f32::NAN;
-        let before = critic.parameters.clone();
-        let error = critic.sweep(&[&episode], &mut Vec::new()).unwrap_err();
-        assert!(error.to_string().contains("gradient of critic."), "{error}");
-        assert_eq!(critic.parameters, before);
     }
 }

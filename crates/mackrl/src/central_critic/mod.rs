@@ -5,7 +5,12 @@
 
 mod critic;
 mod returns;
+mod value;
 
-pub(crate) use critic::not_finite;
 pub use critic::{CentralCritic, CriticReport, CriticSettings, CriticState};
+pub(crate) use critic::{broken_step, check_gradient, named_step};
 pub use returns::{ReturnSettings, lambda_returns};
+pub use value::ValueFunction;
+
+/// What the names of the critic's parameters begin with.
+const CRITIC: &str = "critic";

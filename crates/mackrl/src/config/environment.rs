@@ -2,10 +2,10 @@
 
 use mackrl_env::{
     Environment,
-    matrix_game::MatrixGameSettings,
+    matrix_game::{MatrixGameSettings, payoff_text},
     registry::{self, MATRIX_GAME},
     settings::Accepts,
-    skirmish::{Skirmish, SkirmishSettings},
+    skirmish::{Skirmish, SkirmishSettings, scenario},
 };
 use serde::{Deserialize, Serialize};
 
@@ -101,6 +101,19 @@ impl EnvironmentConfig {
             registry::make_custom(&self.map, &self.scenario, &self.settings)
         }
         .map_err(|error| Error::Config(error.to_string()))
+    }
+
+    /// The data that the world is made of, as text: the map's file or the scenario, then the file of unit statistics; of the
+    /// matrix game its payoffs. Other settings stand in the configuration, everything else in the code.
+    #[must_use]
+    pub fn data(&self) -> String {
+        if !self.scenario.is_empty() {
+            return self.scenario.clone() + self.settings.units.text();
+        }
+        match scenario::map_text(&self.map) {
+            Some(map) => map.to_owned() + self.settings.units.text(),
+            None => payoff_text(self.matrix_game.payoffs),
+        }
     }
 
     /// Checks a section that was read on its own.

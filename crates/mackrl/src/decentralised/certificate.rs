@@ -154,7 +154,7 @@ impl Subject<'_, '_> {
             for episode in 0..episodes as u64 {
                 let key = EpisodeKey::new(self.seed, Stream::Evaluation, episode);
                 let recorded = self.compare_separate_agents(key, behaviour, &mut certificate)?;
-                self.compare_altered_worlds(key, behaviour, &recorded, &mut certificate);
+                self.compare_altered_worlds(key, behaviour, &recorded, &mut certificate)?;
                 done += 1;
                 progress(done, 2 * episodes);
             }
@@ -184,7 +184,7 @@ impl Subject<'_, '_> {
         for step in 0.. {
             let mut action_n = vec![Action::default(); spec.agents];
             let situation = situation(step, &key, &observations, behaviour);
-            actor.act(self.weights, situation, &mut action_n);
+            actor.act(self.weights, situation, &mut action_n)?;
             let central = actor.controller_inputs(0);
             let place = Place {
                 mode: behaviour.mode,
@@ -217,7 +217,7 @@ impl Subject<'_, '_> {
         behaviour: Behaviour,
         recorded: &Recorded,
         certificate: &mut Certificate,
-    ) {
+    ) -> Result<(), Error> {
         let spec = self.environment.spec();
         for agent in (0..spec.agents).map(AgentId::new) {
             let mut actor = self.policy.actor(1);
@@ -232,7 +232,7 @@ impl Subject<'_, '_> {
                 alter_unseen(&mut altered, spec, agent, &key, step);
                 let mut altered_n = vec![Action::default(); spec.agents];
                 let situation = situation(step, &key, &altered, behaviour);
-                actor.act(self.weights, situation, &mut altered_n);
+                actor.act(self.weights, situation, &mut altered_n)?;
                 certificate.altered_actions_compared += 1;
                 let (central, found) = (action_n[agent.index()], altered_n[agent.index()]);
                 if central != found {
@@ -251,6 +251,7 @@ impl Subject<'_, '_> {
                 }
             }
         }
+        Ok(())
     }
 }
 

@@ -4,7 +4,7 @@ use mackrl_env::Action;
 
 use super::*;
 use crate::{
-    Stopwatch,
+    NotFinite, Stopwatch,
     config::{Config, ConfigBuilder},
     nn::ParameterLayout,
     policy::{Actor, Recording, Situation, Tally},
@@ -39,8 +39,13 @@ impl Actor for PeekingActor {
     fn begin(&mut self, recording: Recording) {
         self.0.begin(recording);
     }
-    fn act(&mut self, weights: &Weights, situation: Situation<'_>, actions_bn: &mut [Action]) {
-        self.0.act(weights, situation, actions_bn);
+    fn act(
+        &mut self,
+        weights: &Weights,
+        situation: Situation<'_>,
+        actions_bn: &mut [Action],
+    ) -> Result<(), NotFinite> {
+        self.0.act(weights, situation, actions_bn)?;
         let view = situation.observations.local_view(0, AgentId::new(0));
         let stop = Action::new(1);
         if situation.observations.state(0)[2]
@@ -50,6 +55,7 @@ impl Actor for PeekingActor {
         {
             actions_bn[0] = stop;
         }
+        Ok(())
     }
     fn backward(&mut self, weights: &Weights, w: &[Vec<f32>], gradient: &mut [f32]) -> f64 {
         self.0.backward(weights, w, gradient)

@@ -13,15 +13,17 @@ use super::{
     controller::ControllerMemory,
     sampling::{Path, Sampler},
     statistics::HierarchyStatistics,
+    thought,
 };
 use crate::{
-    Phase, Stopwatch,
+    NotFinite, Phase, Stopwatch,
     common_knowledge::common_knowledge,
     marginalisation::{MarginalGradient, log_likelihood_with_gradient},
+    nn::Named,
     partition::{Pair, PartitionBuffer},
     policy::{
         Actor, ControllerId, ControllerInput, DELEGATE, PolicyTable, Recording, Situation, Tally,
-        Weights,
+        Thought, Weights,
     },
 };
 
@@ -43,6 +45,14 @@ pub(super) struct PairwiseActor {
     /// Members' available actions, \[2, A\] and \[N, A\].
     pair_available_ga: Vec<bool>,
     team_available_ga: Vec<bool>,
+}
+
+/// One environment's tables at one step, and what was made of them.
+struct Decision<'a> {
+    table: PolicyTable<'a, f32>,
+    path: &'a mut Path,
+    known_k: &'a [EntitySet],
+    alive_n: &'a [bool],
 }
 
 /// What an actor keeps of one environment.
@@ -82,13 +92,17 @@ impl PairwiseActor {
     }
 
     /// Advances the pair selector in every environment.
-    fn run_selector(&mut self, weights: &Weights, situation: Situation<'_>) {
+    fn run_selector(
+        &mut self,
+        weights: &Weights,
+        situation: Situation<'_>,
+    ) -> Result<(), NotFinite> {
         let (Some(selector), Some(memory), Some(weights)) = (
             &self.hierarchy.selector,
             &mut self.selector,
             &weights.selector,
         ) else {
-            return;
+            return Ok(());
         };
         memory.begin_step(situation.playing.iter().copied());
         for (row, &b) in situation.playing.iter().enumerate() {
@@ -99,18 +113,25 @@ impl PairwiseActor {
         self.stopwatch.lap(Phase::CommonKnowledge);
         // The paper explores at the second and the third level only.
         memory.run(selector.controller(), weights, 0.0);
+        memory.check_logits(|row| {
+            [
+                ("episode", situation.playing[row]),
+                ("step", situation.step),
+            ]
+        })?;
         for (row, &b) in situation.playing.iter().enumerate() {
             self.worlds[b]
                 .log_p_selector_p
                 .copy_from_slice(memory.log_p(row));
         }
         self.stopwatch.lap(Phase::Act);
+        Ok(())
     }
 
     /// Advances the controllers of all pairs of living agents.
-    fn run_pairs(&mut self, weights: &Weights, situation: Situation<'_>) {
+    fn run_pairs(&mut self, weights: &Weights, situation: Situation<'_>) -> Result<(), NotFinite> {
         let Some(weights) = &weights.pairs else {
-            return;
+            return Ok(());
         };
         let controller = &self.hierarchy.pairs;
         let pairs = self.hierarchy.shape.pairs();
@@ -140,15 +161,27 @@ impl PairwiseActor {
             weights,
             situation.behaviour.exploration,
         );
+        memory.check_logits(|row| {
+            let (b, pair) = self.pair_rows[row];
+            let [first, second] = pair.agents().map(AgentId::index);
+            let step = situation.step;
+            [
+                ("episode", b),
+                ("step", step),
+                ("agent", first),
+                ("agent", second),
+            ]
+        })?;
         for (row, &(b, pair)) in self.pair_rows.iter().enumerate() {
             let log_p_c = memory.log_p(row);
             let first = pair.index() * log_p_c.len();
             self.worlds[b].log_p_pair_kc[first..first + log_p_c.len()].copy_from_slice(log_p_c);
         }
+        Ok(())
     }
 
     /// Advances the controllers of all living agents.
-    fn run_agents(&mut self, weights: &Weights, situation: Situation<'_>) {
+    fn run_agents(&mut self, weights: &Weights, situation: Situation<'_>) -> Result<(), NotFinite> {
         let controller = &self.hierarchy.agents;
         let agents = self.hierarchy.shape.agents;
         self.agent_rows.clear();
@@ -173,37 +206,38 @@ impl PairwiseActor {
             &weights.agents,
             situation.behaviour.exploration,
         );
+        memory.check_logits(|row| {
+            let (b, agent) = self.agent_rows[row];
+            [
+                ("episode", b),
+                ("step", situation.step),
+                ("agent", agent.index()),
+            ]
+        })?;
         for (row, &(b, agent)) in self.agent_rows.iter().enumerate() {
             let log_p_a = memory.log_p(row);
             let first = agent.index() * log_p_a.len();
             self.worlds[b].log_p_agent_na[first..first + log_p_a.len()].copy_from_slice(log_p_a);
         }
+        Ok(())
     }
 
     /// Walks down the hierarchy in environment `b` and, if recording, remembers how log p(u) depends on each choice.
     fn choose(&mut self, b: usize, situation: Situation<'_>, action_n: &mut [Action]) {
-        let hierarchy = &*self.hierarchy;
         let world = &mut self.worlds[b];
-        let key = &situation.keys[b];
-        let table = PolicyTable::new(
-            hierarchy.shape,
-            hierarchy
-                .partitions
-                .in_force(key, situation.step, &mut world.partition_buffer),
-            &world.log_p_selector_p,
-            &world.log_p_pair_kc,
-            &world.log_p_agent_na,
-        )
-        .expect("the buffers have the hierarchy's sizes");
-        let mode = situation.behaviour.mode;
+        let Decision {
+            table,
+            path,
+            known_k,
+            alive_n,
+        } = world.decision(&self.hierarchy, situation, b);
         let sampler = Sampler {
-            key: *key,
+            key: situation.keys[b],
             step: situation.step,
-            mode,
+            mode: situation.behaviour.mode,
         };
-        sampler.sample(&table, action_n, &mut world.path);
-        self.statistics
-            .observe(&table, &world.path, &world.known_k, &world.alive_n);
+        sampler.sample(&table, action_n, path);
+        self.statistics.observe(&table, path, known_k, alive_n);
         if self.recording == Recording::ForLearning {
             self.stopwatch.lap(Phase::Act);
             let log_p = log_likelihood_with_gradient(&table, action_n, &mut self.gradient);
@@ -265,14 +299,19 @@ impl Actor for PairwiseActor {
         self.worlds.iter_mut().for_each(World::begin);
     }
 
-    fn act(&mut self, weights: &Weights, situation: Situation<'_>, actions_bn: &mut [Action]) {
+    fn act(
+        &mut self,
+        weights: &Weights,
+        situation: Situation<'_>,
+        actions_bn: &mut [Action],
+    ) -> Result<(), NotFinite> {
         for &b in situation.playing {
             self.worlds[b].observe(&self.hierarchy, situation.observations, b);
         }
         self.stopwatch.lap(Phase::CommonKnowledge);
-        self.run_selector(weights, situation);
-        self.run_pairs(weights, situation);
-        self.run_agents(weights, situation);
+        self.run_selector(weights, situation)?;
+        self.run_pairs(weights, situation)?;
+        self.run_agents(weights, situation)?;
         let agents = self.hierarchy.shape.agents;
         for &b in situation.playing {
             let action_n = &mut actions_bn[b * agents..(b + 1) * agents];
@@ -283,6 +322,7 @@ impl Actor for PairwiseActor {
             }
         }
         self.stopwatch.lap(Phase::Act);
+        Ok(())
     }
 
     fn backward(&mut self, weights: &Weights, weight_bt: &[Vec<f32>], gradient: &mut [f32]) -> f64 {
@@ -319,6 +359,18 @@ impl Actor for PairwiseActor {
         &mut self.stopwatch
     }
 
+    fn activations(&self) -> Vec<Named<'_, f32>> {
+        let upper = self.selector.iter();
+        let memories = upper.chain([&self.pairs, &self.agents]);
+        memories.flat_map(ControllerMemory::activations).collect()
+    }
+
+    fn gradients(&self) -> Vec<Named<'_, f32>> {
+        let upper = self.selector.iter();
+        let memories = upper.chain([&self.pairs, &self.agents]);
+        memories.flat_map(ControllerMemory::gradients).collect()
+    }
+
     fn controller_inputs(&self, b: usize) -> Vec<ControllerInput> {
         let mut inputs = Vec::new();
         if let Some(memory) = &self.selector
@@ -347,6 +399,22 @@ impl Actor for PairwiseActor {
             inputs.push(self.agents.input(row, ControllerId::AgentController(agent)));
         }
         inputs
+    }
+
+    fn thought(&mut self, b: usize, situation: Situation<'_>, action_n: &[Action]) -> Thought {
+        let decision = self.worlds[b].decision(&self.hierarchy, situation, b);
+        let log_p = log_likelihood_with_gradient(&decision.table, action_n, &mut self.gradient);
+        thought::describe(
+            &thought::Subject {
+                table: decision.table,
+                path: decision.path,
+                known_k: decision.known_k,
+                alive_n: decision.alive_n,
+                action_n,
+            },
+            &self.hierarchy.active_pairs,
+            (log_p, &self.gradient),
+        )
     }
 }
 
@@ -394,6 +462,34 @@ impl World {
                 log_p_c.fill(f32::NEG_INFINITY);
                 log_p_c[DELEGATE] = 0.0;
             }
+        }
+    }
+
+    /// The tables of the latest step.
+    fn decision<'a>(
+        &'a mut self,
+        hierarchy: &'a Hierarchy,
+        situation: Situation<'_>,
+        b: usize,
+    ) -> Decision<'a> {
+        let partitions = hierarchy.partitions.in_force(
+            &situation.keys[b],
+            situation.step,
+            &mut self.partition_buffer,
+        );
+        let table = PolicyTable::new(
+            hierarchy.shape,
+            partitions,
+            &self.log_p_selector_p,
+            &self.log_p_pair_kc,
+            &self.log_p_agent_na,
+        )
+        .expect("the buffers have the hierarchy's sizes");
+        Decision {
+            table,
+            path: &mut self.path,
+            known_k: &self.known_k,
+            alive_n: &self.alive_n,
         }
     }
 

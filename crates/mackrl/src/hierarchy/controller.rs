@@ -6,9 +6,10 @@
 use mackrl_env::EpisodeKey;
 
 use crate::{
+    NotFinite,
     nn::{
-        MaskedLogSoftmax, NetworkSizes, ParameterLayout, RecurrentNetwork, RecurrentWeights,
-        Retention, Trace,
+        MaskedLogSoftmax, Named, NetworkSizes, ParameterLayout, RecurrentNetwork, RecurrentWeights,
+        Retention, Trace, first_not_finite,
     },
     policy::{ControllerId, ControllerInput, Recording},
 };
@@ -19,13 +20,19 @@ const ABSENT: usize = usize::MAX;
 /// One controller's network.
 #[derive(Debug, Clone)]
 pub(crate) struct Controller {
+    name: &'static str,
     network: RecurrentNetwork,
 }
 
 impl Controller {
     /// Adds the controller's parameters to `layout`.
-    pub(crate) fn new(layout: &mut ParameterLayout, name: &str, sizes: NetworkSizes) -> Self {
+    pub(crate) fn new(
+        layout: &mut ParameterLayout,
+        name: &'static str,
+        sizes: NetworkSizes,
+    ) -> Self {
         Self {
+            name,
             network: RecurrentNetwork::new(layout, name, sizes),
         }
     }
@@ -49,6 +56,7 @@ impl Controller {
 /// The rows of one controller over an episode.
 #[derive(Debug)]
 pub(crate) struct ControllerMemory {
+    name: &'static str,
     sizes: NetworkSizes,
     recording: Recording,
     trace: Trace<f32>,
@@ -93,6 +101,7 @@ impl ControllerMemory {
     pub(crate) fn new(controller: &Controller) -> Self {
         let sizes = controller.network.sizes();
         Self {
+            name: controller.name,
             sizes,
             recording: Recording::Off,
             trace: Trace::new(sizes, Retention::LastStep),
@@ -201,6 +210,22 @@ impl ControllerMemory {
         );
     }
 
+    /// Refuses logits of this step that are not finite; `instance` names what a row belongs to, outermost axis first.
+    pub(crate) fn check_logits<const N: usize>(
+        &self,
+        instance: impl FnOnce(usize) -> [(&'static str, usize); N],
+    ) -> Result<(), NotFinite> {
+        let logits = self.trace.last_logits();
+        let Some(index) = first_not_finite(logits) else {
+            return Ok(());
+        };
+        let columns = self.sizes.outputs;
+        let mut place = instance(index / columns).to_vec();
+        place.push(("column", index % columns));
+        let tensor = format!("logits of {}", self.name);
+        Err(NotFinite::new(tensor, &place, logits[index]))
+    }
+
     /// The log-probabilities \[C\] of a row of this step.
     pub(crate) fn log_p(&self, row: usize) -> &[f32] {
         let columns = self.sizes.outputs;
@@ -223,6 +248,21 @@ impl ControllerMemory {
             controller,
             values: all[row * inputs..(row + 1) * inputs].to_vec(),
         }
+    }
+
+    /// What was computed since [`Self::begin`], in that order.
+    pub(crate) fn activations(&self) -> Vec<Named<'_, f32>> {
+        let mut activations = self.trace.named(self.name);
+        let columns = self.sizes.outputs;
+        let tables = &self.log_p_rc[..(self.first_row + self.rows) * columns];
+        let name = format!("{} log p", self.name);
+        activations.push(Named::new(name, ["row", "column"], columns, tables));
+        activations
+    }
+
+    /// What the latest backward pass computed, in that order.
+    pub(crate) fn gradients(&self) -> Vec<Named<'_, f32>> {
+        self.trace.named_gradients(self.name)
     }
 
     /// Notes that log p(u) of this step in `environment` depends on an entry of a row with the weight `posterior`.

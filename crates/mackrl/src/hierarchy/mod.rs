@@ -18,6 +18,7 @@ pub(crate) mod pair_controller;
 pub(crate) mod pair_selector;
 mod sampling;
 pub(crate) mod statistics;
+pub(crate) mod thought;
 
 use std::sync::Arc;
 

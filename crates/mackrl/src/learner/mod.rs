@@ -9,9 +9,12 @@
 use mackrl_env::{EpisodeKey, Stream};
 
 use crate::{
-    Error, Phase, Stopwatch,
-    central_critic::{CentralCritic, CriticReport, CriticSettings, CriticState, not_finite},
-    nn::{Moments, Optimiser, OptimiserKind, clip_gradient_norm, first_not_finite},
+    NotFinite, Phase, Real, Stopwatch,
+    central_critic::{
+        CentralCritic, CriticReport, CriticSettings, CriticState, broken_step, check_gradient,
+        named_step,
+    },
+    nn::{Moments, Named, Optimiser, OptimiserKind, clip_gradient_norm, first_not_finite},
     parallel::for_each_in_parallel,
     policy::{Policy, Weights},
     rollout::{Episode, ShardBatch},
@@ -69,6 +72,18 @@ pub struct Learner {
     shard_gradients: Vec<Vec<f32>>,
     advantage_bt: Vec<Vec<f32>>,
     updates: u64,
+    reached: Reached,
+}
+
+/// How far an update came.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Reached {
+    /// The critic's sweep.
+    Critic,
+    /// The policy's gradient.
+    Gradient,
+    /// The optimiser's step.
+    Step,
 }
 
 /// One shard's part of the backward pass.
@@ -102,6 +117,7 @@ impl Learner {
             shard_gradients: Vec::new(),
             advantage_bt: Vec::new(),
             updates: 0,
+            reached: Reached::Critic,
             parameters,
         }
     }
@@ -128,6 +144,36 @@ impl Learner {
     #[must_use]
     pub const fn updates(&self) -> u64 {
         self.updates
+    }
+
+    /// How far the latest update came.
+    #[must_use]
+    pub const fn reached(&self) -> Reached {
+        self.reached
+    }
+
+    /// Advantages of the latest update, one list for each episode.
+    #[must_use]
+    pub fn advantages(&self) -> Vec<Named<'_, f32>> {
+        let advantages = self.advantage_bt.iter();
+        advantages
+            .map(|advantage_t| Named::new("advantages", ["step", ""], 1, advantage_t))
+            .collect()
+    }
+
+    /// The latest gradient of the policy, tensor by tensor.
+    #[must_use]
+    pub fn gradient(&self, policy: &dyn Policy) -> Vec<Named<'_, f32>> {
+        let gradient = self.shard_gradients.first();
+        gradient.map_or_else(Vec::new, |gradient| {
+            policy.layout().named("gradient of ", gradient)
+        })
+    }
+
+    /// The policy's state after the latest step, accepted or not, tensor by tensor.
+    #[must_use]
+    pub fn after_step(&self, policy: &dyn Policy) -> Vec<Named<'_, f32>> {
+        named_step(policy.layout(), &self.optimiser, &self.parameters)
     }
 
     /// What a checkpoint must hold.
@@ -159,65 +205,69 @@ impl Learner {
     /// `∇J = 1 / (N Σ_b T_b) Σ_{b,t} A_{bt} ∇ log p(u_{bt})` (eq. 6), then one step of the optimiser.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] if a reward or a state is not finite, before anything changes; or if a gradient is not finite: the
-    /// policy has not changed then.
+    /// [`NotFinite`] if a number of the critic's sweep, an advantage, a gradient, or a number after the step is not finite.
+    /// Nothing has changed then: neither the policy nor the critic keeps anything of such an update.
     pub fn update(
         &mut self,
         policy: &dyn Policy,
         shards: Vec<&mut ShardBatch>,
         stopwatch: &mut Stopwatch,
-    ) -> Result<UpdateReport, Error> {
+    ) -> Result<UpdateReport, NotFinite> {
         let episodes: Vec<&Episode> = shards.iter().flat_map(|shard| &shard.episodes).collect();
-        self.check_finite(&episodes)?;
         let steps: usize = episodes.iter().map(|episode| episode.steps()).sum();
+        self.reached = Reached::Critic;
         let critic = self.critic.sweep(&episodes, &mut self.advantage_bt)?;
-        let advantages = self.advantage_bt.iter().flatten();
-        let advantage_mean = advantages.map(|&a| f64::from(a)).sum::<f64>() / steps as f64;
         stopwatch.lap(Phase::Critic);
-        let objective = self.backward(shards, steps);
-        stopwatch.lap(Phase::Backward);
-        let gradient = &mut self.shard_gradients[0];
-        if let Some(index) = first_not_finite(gradient) {
-            let layout = policy.layout();
-            return Err(not_finite(
-                layout,
-                "gradient of",
-                index,
-                gradient,
-                self.updates,
-            ));
-        }
-        let norm = clip_gradient_norm(gradient, self.settings.gradient_norm_max);
-        self.optimiser
-            .step(self.settings.learning_rate, gradient, &mut self.parameters);
+        let stepped = self.policy_step(policy, shards, steps, stopwatch);
+        let (policy_gradient_norm, objective) = match stepped {
+            Ok(stepped) => stepped,
+            Err(broken) => {
+                self.critic.undo();
+                return Err(broken);
+            }
+        };
         policy.refresh(&self.parameters, &mut self.weights);
         self.updates += 1;
         stopwatch.lap(Phase::Optimiser);
+        let advantages = self.advantage_bt.iter().flatten();
         Ok(UpdateReport {
             policy_loss: -objective,
-            policy_gradient_norm: norm,
-            advantage_mean,
+            policy_gradient_norm,
+            advantage_mean: advantages.map(|&a| f64::from(a)).sum::<f64>() / steps as f64,
             critic,
         })
     }
 
-    /// Refuses episodes that hold a number that is not finite.
-    fn check_finite(&self, episodes: &[&Episode]) -> Result<(), Error> {
-        for (b, episode) in episodes.iter().enumerate() {
-            for (what, numbers) in [("reward", &episode.reward_t), ("state", &episode.state_tg)] {
-                if let Some(index) = first_not_finite(numbers) {
-                    // T rewards, but T + 1 states.
-                    let times = episode.steps() + usize::from(what == "state");
-                    let t = index * times / numbers.len();
-                    return Err(Error::NotFinite {
-                        tensor: format!("{what} at step {t} of episode {b} of the batch"),
-                        value: f64::from(numbers[index]),
-                        update: self.updates,
-                    });
-                }
-            }
+    /// Takes one step of the policy's optimiser; gives the gradient's norm and J.
+    fn policy_step(
+        &mut self,
+        policy: &dyn Policy,
+        shards: Vec<&mut ShardBatch>,
+        steps: usize,
+        stopwatch: &mut Stopwatch,
+    ) -> Result<(f64, f64), NotFinite> {
+        check_advantages(&self.advantage_bt)?;
+        self.reached = Reached::Gradient;
+        let objective = self.backward(shards, steps);
+        stopwatch.lap(Phase::Backward);
+        if !objective.is_finite() {
+            return Err(NotFinite::new(
+                "sum of A log p(u)",
+                &[],
+                f32::from_f64(objective),
+            ));
         }
-        Ok(())
+        let gradient = &mut self.shard_gradients[0];
+        let norm = clip_gradient_norm(gradient, self.settings.gradient_norm_max);
+        let layout = policy.layout();
+        check_gradient(norm, layout, gradient)?;
+        self.reached = Reached::Step;
+        let optimiser = &mut self.optimiser;
+        optimiser
+            .propose(self.settings.learning_rate, gradient, &self.parameters)
+            .map_err(|broken| broken_step(broken, layout, optimiser))?;
+        optimiser.accept(&mut self.parameters);
+        Ok((norm, objective))
     }
 
     /// Computes the gradient of −J into the first shard's gradient and returns J.
@@ -268,146 +318,16 @@ impl Learner {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use mackrl_env::Action;
-
-    use super::*;
-    use crate::{
-        baselines::CentralV,
-        central_critic::ReturnSettings,
-        config::Config,
-        policy::{Actor, Behaviour, ControllerInput, Recording, Situation, Tally},
-        rollout::{Rollout, RolloutSettings},
-        training::assembly::{self, World},
-    };
-
-    /// An actor whose gradient is broken in one place.
-    struct Broken(usize, Stopwatch);
-
-    impl Actor for Broken {
-        fn begin(&mut self, _: Recording) {}
-        fn act(&mut self, _: &Weights, _: Situation<'_>, _: &mut [Action]) {}
-        fn backward(&mut self, _: &Weights, _: &[Vec<f32>], gradient: &mut [f32]) -> f64 {
-            gradient[self.0] = f32::NAN;
-            0.0
-        }
-        fn report(&self, _: &mut Tally) {}
-        fn controller_inputs(&self, _: usize) -> Vec<ControllerInput> {
-            Vec::new()
-        }
-        fn stopwatch(&mut self) -> &mut Stopwatch {
-            &mut self.1
+/// Refuses advantages that are not finite.
+fn check_advantages(advantage_bt: &[Vec<f32>]) -> Result<(), NotFinite> {
+    for (b, advantage_t) in advantage_bt.iter().enumerate() {
+        if let Some(t) = first_not_finite(advantage_t) {
+            let place = [("episode", b), ("step", t)];
+            return Err(NotFinite::new("advantage", &place, advantage_t[t]));
         }
     }
-
-    #[test]
-    fn a_gradient_that_is_no_number_is_refused_and_the_policy_stays_as_it_was() {
-        let mut config = Config::default();
-        config.env.map = "matrix-game".to_owned();
-        config.policy.hidden = 5;
-        let world = World::new(&config).unwrap();
-        let policy = assembly::policy(&config, &world).unwrap();
-        let sizes = [world.spec().agents, world.spec().state_size];
-        let mut learner = Learner::new(&*policy, sizes, assembly::learner(&config), 1, 1);
-        let mut rollout = Rollout::new(&*policy, world.environments(3).unwrap(), 3, 1);
-        let keys = [0, 1, 2].map(|episode| EpisodeKey::new(1, Stream::Training, episode));
-        let settings = RolloutSettings {
-            behaviour: Behaviour::sampled(0.5),
-            recording: Recording::ForLearning,
-        };
-        rollout.play(learner.weights(), &keys, settings).unwrap();
-        let mut broken = ShardBatch {
-            episodes: rollout.batches().next().unwrap().episodes.clone(),
-            actor: Box::new(Broken(policy.layout().len() - 1, Stopwatch::default())),
-        };
-        let before = learner.parameters().to_vec();
-        let error = learner
-            .update(&*policy, vec![&mut broken], &mut Stopwatch::default())
-            .unwrap_err();
-        let name = &policy.layout().tensors().last().unwrap().name;
-        assert!(error.to_string().contains(name), "{error}");
-        assert_eq!(learner.parameters(), before);
-        assert_eq!(learner.updates(), 0);
-        learner
-            .update(
-                &*policy,
-                rollout.batches().collect(),
-                &mut Stopwatch::default(),
-            )
-            .unwrap();
-        assert_ne!(learner.parameters(), before);
-        assert_eq!(learner.updates(), 1);
-    }
-
-    /// A learner of the built-in map and a batch of two episodes.
-    fn prepare() -> (CentralV, Learner, Rollout) {
-        let environments = || Config::default().env.make().unwrap();
-        let spec = environments().spec().clone();
-        let policy = CentralV::new(&spec, 5);
-        let settings = LearnerSettings {
-            optimiser: OptimiserKind::ADAM,
-            learning_rate: 1e-3,
-            gradient_norm_max: 10.0,
-            critic: CriticSettings {
-                hidden: 5,
-                optimiser: OptimiserKind::ADAM,
-                learning_rate: 1e-3,
-                gradient_norm_max: 10.0,
-                returns: ReturnSettings {
-                    gamma: 0.99,
-                    lambda: 0.8,
-                },
-                target_interval_updates: 200,
-                bootstrap_at_time_limit: false,
-            },
-        };
-        let learner = Learner::new(&policy, [spec.agents, spec.state_size], settings, 1, 1);
-        let mut rollout = Rollout::new(&policy, vec![environments(), environments()], 2, 1);
-        let keys = [0, 1].map(|episode| EpisodeKey::new(1, Stream::Training, episode));
-        let settings = RolloutSettings {
-            behaviour: Behaviour::sampled(0.5),
-            recording: Recording::ForLearning,
-        };
-        rollout.play(learner.weights(), &keys, settings).unwrap();
-        (policy, learner, rollout)
-    }
-
-    #[test]
-    fn a_number_that_is_not_finite_is_named_before_anything_changes() {
-        let (policy, mut learner, mut rollout) = prepare();
-        let before = learner.state();
-        let plant = |rollout: &mut Rollout, reward: f32, state: f32| {
-            let batch = rollout.batches().next().unwrap();
-            batch.episodes[1].reward_t[3] = reward;
-            let size = batch.episodes[1].state(0).len();
-            batch.episodes[1].state_tg[7 * size + size - 1] = state;
-        };
-        for (reward, state, expected) in [
-            (
-                f32::NAN,
-                0.0,
-                "reward at step 3 of episode 1 of the batch holds NaN at update 0",
-            ),
-            (
-                0.0,
-                f32::INFINITY,
-                "state at step 7 of episode 1 of the batch holds inf at update 0",
-            ),
-        ] {
-            plant(&mut rollout, reward, state);
-            let batches = rollout.batches().collect();
-            let error = learner
-                .update(&policy, batches, &mut Stopwatch::default())
-                .unwrap_err();
-            assert_eq!(error.to_string(), expected);
-            assert!(learner.state() == before, "nothing has changed");
-        }
-        plant(&mut rollout, 0.0, 0.0);
-        let batches = rollout.batches().collect();
-        learner
-            .update(&policy, batches, &mut Stopwatch::default())
-            .unwrap();
-        assert!(learner.state() != before, "a sound batch is learnt from");
-    }
+    Ok(())
 }
+
+#[cfg(test)]
+mod tests;

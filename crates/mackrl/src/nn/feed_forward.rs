@@ -30,12 +30,12 @@ pub struct FeedForwardWeights<R> {
 /// The activations of a [`FeedForward`] for one batch of rows; the caller's, and used from batch to batch.
 #[derive(Debug, Clone)]
 pub struct FeedForwardTrace<R> {
-    sizes: NetworkSizes,
-    rows: usize,
-    inputs: Aligned<R>,
-    features: Aligned<R>,
+    pub(crate) sizes: NetworkSizes,
+    pub(crate) rows: usize,
+    pub(crate) inputs: Aligned<R>,
+    pub(crate) features: Aligned<R>,
     features_gradient: Aligned<R>,
-    outputs: Aligned<R>,
+    pub(crate) outputs: Aligned<R>,
     outputs_gradient: Aligned<R>,
     scratch: Aligned<R>,
 }

@@ -8,6 +8,7 @@
 
 mod tables;
 mod tally;
+mod thought;
 
 use std::fmt::Debug;
 
@@ -16,10 +17,14 @@ use serde::{Deserialize, Serialize};
 
 pub use tables::{DELEGATE, PolicyShape, PolicyTable};
 pub use tally::Tally;
+pub(crate) use thought::most_probable;
+pub use thought::{
+    AgentThought, Choice, JointOption, PairThought, PartitionThought, SoloOption, Thought,
+};
 
 use crate::{
-    Stopwatch,
-    nn::{ParameterLayout, RecurrentWeights},
+    NotFinite, Stopwatch,
+    nn::{Named, ParameterLayout, RecurrentWeights},
 };
 
 /// How a controller turns its distribution into a choice.
@@ -124,7 +129,15 @@ pub trait Actor: Send {
     ///
     /// # Shapes
     /// `actions_bn` \[B, N\]; rows of environments that have left are not touched.
-    fn act(&mut self, weights: &Weights, situation: Situation<'_>, actions_bn: &mut [Action]);
+    ///
+    /// # Errors
+    /// [`NotFinite`] if a controller's logit is not finite: there is nothing to choose from then.
+    fn act(
+        &mut self,
+        weights: &Weights,
+        situation: Situation<'_>,
+        actions_bn: &mut [Action],
+    ) -> Result<(), NotFinite>;
 
     /// Adds `Σ_{b,t} weight_bt ∇ log p(u_t)` to `gradient` and returns `Σ_{b,t} weight_bt log p(u_t)`, where p is the
     /// marginal probability (eq. 5) of the joint action that was taken.
@@ -139,8 +152,26 @@ pub trait Actor: Send {
     /// Measures where the time of this actor and of the environments that it plays in goes, once it is started.
     fn stopwatch(&mut self) -> &mut Stopwatch;
 
+    /// What was computed since [`Self::begin`], in that order, for whoever looks for a number that is not finite. An actor
+    /// that keeps nothing has nothing to show.
+    fn activations(&self) -> Vec<Named<'_, f32>> {
+        Vec::new()
+    }
+
+    /// What the latest backward pass computed on its way to the parameters' gradients, in that order.
+    fn gradients(&self) -> Vec<Named<'_, f32>> {
+        Vec::new()
+    }
+
     /// What the controllers of environment `b` read at the latest step.
     fn controller_inputs(&self, b: usize) -> Vec<ControllerInput>;
+
+    /// What the controllers of environment `b` computed at the latest step, which was `situation` and led to `action_n` \[N\].
+    /// Nothing, for actors that have no controllers to look into.
+    fn thought(&mut self, b: usize, situation: Situation<'_>, action_n: &[Action]) -> Thought {
+        let _ = (b, situation, action_n);
+        Thought::default()
+    }
 }
 
 /// Names one controller of the hierarchy.

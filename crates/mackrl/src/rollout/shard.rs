@@ -12,7 +12,8 @@ use mackrl_env::{Action, Environment, EpisodeKey, Observations};
 
 use super::{Episode, RolloutSettings};
 use crate::{
-    Error, Phase,
+    Error, NotFinite, Phase,
+    nn::first_not_finite,
     policy::{Actor, Situation, Weights},
 };
 
@@ -80,8 +81,8 @@ impl Shard {
     /// Plays the episodes named `keys`, at most one per environment, to their ends.
     ///
     /// # Errors
-    /// If an environment refuses an action, which means that the policy's masks disagree with it; [`Error::Stopped`] if asked to
-    /// stop.
+    /// If an environment refuses an action, which means that the policy's masks disagree with it, or if something that an
+    /// environment or a controller gives is not finite; [`Error::Stopped`] if asked to stop.
     pub fn play(
         &mut self,
         weights: &Weights,
@@ -95,6 +96,7 @@ impl Shard {
         self.batch.actor.stopwatch().skip();
         for (b, key) in keys.iter().enumerate() {
             self.environments[b].reset(*key, &mut self.observations.row_mut(b));
+            check_finite(&self.observations, b, 0)?;
             self.batch.episodes[b].clear();
             self.batch.episodes[b].remember_state(settings.recording, &self.observations, b);
         }
@@ -116,9 +118,9 @@ impl Shard {
             };
             self.batch
                 .actor
-                .act(weights, situation, &mut self.actions_bn);
+                .act(weights, situation, &mut self.actions_bn)?;
             for &b in &playing {
-                self.step(b, settings)?;
+                self.step(b, step, settings)?;
             }
             self.batch.actor.stopwatch().lap(Phase::Simulate);
             playing.retain(|&b| self.batch.episodes[b].end.is_none());
@@ -126,10 +128,15 @@ impl Shard {
         Ok(())
     }
 
-    /// Plays the chosen actions in environment `b`.
-    fn step(&mut self, b: usize, settings: RolloutSettings) -> Result<(), Error> {
+    /// Plays the chosen actions of a step in environment `b`.
+    fn step(&mut self, b: usize, step: usize, settings: RolloutSettings) -> Result<(), Error> {
         let actions = &self.actions_bn[b * self.agents..(b + 1) * self.agents];
         let time_step = self.environments[b].step(actions, &mut self.observations.row_mut(b))?;
+        if !time_step.reward.is_finite() {
+            let place = [("episode", b), ("step", step)];
+            return Err(NotFinite::new("reward", &place, time_step.reward).into());
+        }
+        check_finite(&self.observations, b, step + 1)?;
         let episode = &mut self.batch.episodes[b];
         episode.reward_t.push(time_step.reward);
         episode.end = time_step.end;
@@ -139,6 +146,25 @@ impl Shard {
         }
         Ok(())
     }
+}
+
+/// Refuses what environment `b` shows before step `step` if a number of it is not finite.
+fn check_finite(observations: &Observations, b: usize, step: usize) -> Result<(), NotFinite> {
+    for (whose, width, numbers) in observations.numbers(b) {
+        if let Some(index) = first_not_finite(numbers) {
+            let mut place = vec![("episode", b), ("step", step)];
+            let tensor = match whose {
+                "state" => whose.to_owned(),
+                row => {
+                    place.push((row, index / width));
+                    format!("observation of an {row}")
+                }
+            };
+            place.push(("feature", index % width));
+            return Err(NotFinite::new(tensor, &place, numbers[index]));
+        }
+    }
+    Ok(())
 }
 
 impl fmt::Debug for ShardBatch {

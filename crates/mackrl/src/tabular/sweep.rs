@@ -16,7 +16,7 @@ use super::{
     policy::Learner,
     training::{Run, train},
 };
-use crate::parallel::for_each_in_parallel;
+use crate::{parallel::for_each_in_parallel, statistics::mean_and_standard_error};
 
 /// What is run.
 #[derive(Debug, Clone, PartialEq)]
@@ -105,7 +105,10 @@ impl Sweep {
     #[must_use]
     pub fn curve(&self, learner: Learner, quantity: impl Fn(&Run) -> f64) -> Curve {
         (0..self.points)
-            .map(|point| mean_and_sem(self.runs(learner, point).iter().map(&quantity)))
+            .map(|point| {
+                let runs = self.runs(learner, point).iter();
+                mean_and_standard_error(&runs.map(&quantity).collect::<Vec<_>>())
+            })
             .collect()
     }
 
@@ -120,7 +123,10 @@ impl Sweep {
         (0..self.points)
             .map(|point| {
                 let pairs = (self.runs(first, point).iter()).zip(self.runs(second, point));
-                mean_and_sem(pairs.map(|(first, second)| quantity(first) - quantity(second)))
+                let differences: Vec<f64> = pairs
+                    .map(|(first, second)| quantity(first) - quantity(second))
+                    .collect();
+                mean_and_standard_error(&differences)
             })
             .collect()
     }
@@ -131,16 +137,6 @@ impl FromIterator<(f64, f64)> for Curve {
         let (mean, sem) = entries.into_iter().unzip();
         Self { mean, sem }
     }
-}
-
-/// The mean, and the standard deviation (n − 1) over √n.
-fn mean_and_sem(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    let values: Vec<f64> = values.collect();
-    let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-    let variance = squares / (count - 1.0).max(1.0);
-    (mean, (variance / count).sqrt())
 }
 
 #[cfg(test)]
@@ -156,14 +152,6 @@ mod tests {
             seed: 1,
             threads: NonZeroUsize::new(threads).unwrap(),
         }
-    }
-
-    #[test]
-    fn the_standard_error_is_that_of_the_textbook() {
-        let (mean, sem) = mean_and_sem([1.0, 2.0, 6.0].into_iter());
-        assert_eq!(mean, 3.0);
-        assert!((sem - (14.0_f64 / 2.0 / 3.0).sqrt()).abs() < 1e-15, "{sem}");
-        assert_eq!(mean_and_sem([4.0].into_iter()), (4.0, 0.0));
     }
 
     #[test]

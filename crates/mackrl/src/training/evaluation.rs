@@ -11,6 +11,7 @@ use crate::{
     config::Config,
     policy::{Behaviour, Policy, Recording, Tally, Weights},
     rollout::{Rollout, RolloutSettings},
+    statistics::mean_and_standard_error,
 };
 
 /// Episodes that are played at once.
@@ -94,6 +95,11 @@ impl Evaluator {
         self.rollout.stop_when(stop);
     }
 
+    /// What the latest episodes were played with.
+    pub(super) const fn rollout(&mut self) -> &mut Rollout {
+        &mut self.rollout
+    }
+
     /// Plays `episodes` greedy episodes, of which number `i` is named `key(i)`.
     pub(super) fn play(
         &mut self,
@@ -145,29 +151,5 @@ impl Evaluator {
                 .map(|(name, mean)| (name.to_owned(), mean))
                 .collect(),
         })
-    }
-}
-
-/// The mean and its standard error s/√n, with the unbiased sample variance; the error of a single sample is 0.
-fn mean_and_standard_error(sample: &[f64]) -> (f64, f64) {
-    let count = sample.len() as f64;
-    let mean = sample.iter().sum::<f64>() / count;
-    if sample.len() < 2 {
-        return (mean, 0.0);
-    }
-    let squares: f64 = sample.iter().map(|x| (x - mean).powi(2)).sum();
-    (mean, (squares / (count - 1.0) / count).sqrt())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_standard_error_is_that_of_the_mean() {
-        let (mean, error) = mean_and_standard_error(&[1.0, 2.0, 4.0, 5.0]);
-        assert!((mean - 3.0).abs() < 1e-12);
-        assert!((error - (10.0_f64 / 3.0 / 4.0).sqrt()).abs() < 1e-12);
-        assert_eq!(mean_and_standard_error(&[7.0]), (7.0, 0.0));
     }
 }

@@ -7,12 +7,14 @@
 pub mod assembly;
 mod checkpoint;
 mod evaluation;
+mod examination;
 mod metrics;
 mod trainer;
 mod weights;
 
 pub use checkpoint::Checkpoint;
 pub use evaluation::{Evaluation, evaluate};
+pub use examination::{Examination, Part, TensorStatistics};
 pub use metrics::{METRICS, MetricRow};
 pub use trainer::Trainer;
 pub use weights::{read_weights, write_weights};

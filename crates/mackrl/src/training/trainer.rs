@@ -14,7 +14,7 @@ use super::{
     read_weights, write_weights,
 };
 use crate::{
-    Error, Phase, Stopwatch,
+    Error, Moment, Phase, Stopwatch,
     config::Config,
     decentralised::Decentralised,
     learner::{Learner, UpdateReport},
@@ -28,10 +28,10 @@ const SHARD_SIZE: usize = 4;
 /// Trains one team.
 pub struct Trainer {
     config: Config,
-    policy: Box<dyn Decentralised>,
-    learner: Learner,
-    rollout: Rollout,
-    evaluator: Evaluator,
+    pub(super) policy: Box<dyn Decentralised>,
+    pub(super) learner: Learner,
+    pub(super) rollout: Rollout,
+    pub(super) evaluator: Evaluator,
     steps_env: u64,
     episodes: u64,
     tests: u64,
@@ -119,10 +119,11 @@ impl Trainer {
     /// and after the last batch. Gives a row of metrics at every test and at every interval between.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] if a gradient is not finite; the policy has not changed then. [`Error::Stopped`] if asked to stop;
-    /// nothing has changed then, and the same update can be made again.
+    /// [`Error::NotFinite`] if a number is not finite: one that an environment gives, a logit, a number of the critic's, a
+    /// gradient, a moment or a parameter after the step. [`Error::Stopped`] if asked to stop. The trainer is as it was before then,
+    /// and can make the same update again.
     pub fn update(&mut self) -> Result<Option<MetricRow>, Error> {
-        if self.steps_env >= self.next_test {
+        if self.is_test_due() {
             return self.test().map(Some);
         }
         self.learn()?;
@@ -210,6 +211,19 @@ impl Trainer {
         }
     }
 
+    /// Whether the next iteration is a test.
+    pub(super) const fn is_test_due(&self) -> bool {
+        self.steps_env >= self.next_test
+    }
+
+    /// What a number that is not finite is dated with.
+    const fn moment(&self) -> Moment {
+        Moment {
+            update: self.learner.updates(),
+            steps_env: self.steps_env,
+        }
+    }
+
     /// ε of the bounded softmax now: it falls linearly with the environment steps.
     fn exploration(&self) -> f64 {
         let schedule = &self.config.exploration;
@@ -219,44 +233,65 @@ impl Trainer {
 
     /// Plays a batch of training episodes and learns from it.
     fn learn(&mut self) -> Result<(), Error> {
-        let exploration = self.exploration();
+        self.play()?;
+        self.learn_from_batch()
+    }
+
+    /// Plays a batch of training episodes.
+    pub(super) fn play(&mut self) -> Result<(), Error> {
         let settings = RolloutSettings {
-            behaviour: Behaviour::sampled(exploration),
+            behaviour: Behaviour::sampled(self.exploration()),
             recording: Recording::ForLearning,
         };
-        let batch = self.config.learner.environments as u64;
+        let moment = self.moment();
         let seed = self.config.run.seed;
-        let keys: Vec<EpisodeKey> = (self.episodes..self.episodes + batch)
+        let keys: Vec<EpisodeKey> = (self.episodes..self.episodes + self.batch())
             .map(|episode| EpisodeKey::new(seed, Stream::Training, episode))
             .collect();
         self.stopwatch.lap(Phase::Other);
-        self.rollout.play(self.learner.weights(), &keys, settings)?;
+        self.rollout
+            .play(self.learner.weights(), &keys, settings)
+            .map_err(|error| dated(error, moment))?;
         self.stopwatch.lap_shared_by(self.rollout.stopwatches());
-        self.episodes += batch;
-        for episode in self.rollout.batches().flat_map(|batch| &batch.episodes) {
-            self.steps_env += episode.steps() as u64;
-            self.interval.note_episode(episode);
-        }
+        Ok(())
+    }
+
+    /// Learns from the batch that was played last.
+    pub(super) fn learn_from_batch(&mut self) -> Result<(), Error> {
+        let (exploration, moment) = (self.exploration(), self.moment());
         let batches = self.rollout.batches().collect();
         self.stopwatch.lap(Phase::Other);
         let report = self
             .learner
-            .update(&*self.policy, batches, &mut self.stopwatch)?;
+            .update(&*self.policy, batches, &mut self.stopwatch)
+            .map_err(|broken| dated(broken.into(), moment))?;
+        self.episodes += self.batch();
+        for episode in self.rollout.batches().flat_map(|batch| &batch.episodes) {
+            self.steps_env += episode.steps() as u64;
+            self.interval.note_episode(episode);
+        }
         self.interval.note_update(&report, exploration);
         self.interval.tally.merge(&self.rollout.tally());
         Ok(())
     }
 
+    /// Episodes of a batch.
+    const fn batch(&self) -> u64 {
+        self.config.learner.environments as u64
+    }
+
     /// Plays greedy test episodes.
     fn test(&mut self) -> Result<MetricRow, Error> {
         self.stopwatch.lap(Phase::Other);
+        let moment = self.moment();
         let test = &self.config.test;
         let (seed, first) = (self.config.run.seed, self.tests * test.episodes as u64);
         let evaluation = self
             .evaluator
             .play(self.learner.weights(), test.episodes, |episode| {
                 EpisodeKey::new(seed, Stream::Test, first + episode)
-            })?;
+            })
+            .map_err(|error| dated(error, moment))?;
         self.stopwatch.lap(Phase::Test);
         self.tests += 1;
         self.next_test = (self.steps_env / test.interval_steps_env + 1) * test.interval_steps_env;
@@ -286,6 +321,14 @@ impl Trainer {
             );
         }
         row
+    }
+}
+
+/// The error with the moment of training at which it came, if it is a number that is not finite.
+fn dated(error: Error, moment: Moment) -> Error {
+    match error {
+        Error::NotFinite(broken) => broken.at(moment).into(),
+        other => other,
     }
 }
 

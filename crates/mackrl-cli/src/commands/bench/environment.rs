@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use mackrl::config::ConfigBuilder;
-use mackrl_env::{IllegalAction, random_play::RandomPlay};
+use mackrl_env::{StepError, random_play::RandomPlay};
 use serde::Serialize;
 
 use super::print_rows;
@@ -29,7 +29,7 @@ struct EnvironmentSpeed {
 /// One thread's environment, and how its latest part went.
 struct Player {
     play: RandomPlay,
-    outcome: Result<(), IllegalAction>,
+    outcome: Result<(), StepError>,
 }
 
 pub(super) fn run(args: &BenchEnvironmentArgs) -> anyhow::Result<()> {
@@ -61,7 +61,7 @@ pub(super) fn run(args: &BenchEnvironmentArgs) -> anyhow::Result<()> {
     ])
 }
 
-fn measure(mut players: Vec<Player>, steps: u64) -> Result<EnvironmentSpeed, IllegalAction> {
+fn measure(mut players: Vec<Player>, steps: u64) -> Result<EnvironmentSpeed, StepError> {
     let mut parts = Vec::new();
     for part in 0..PARTS {
         let steps = share(steps, part, PARTS);
@@ -84,7 +84,7 @@ fn measure(mut players: Vec<Player>, steps: u64) -> Result<EnvironmentSpeed, Ill
 }
 
 /// Plays `steps` steps in all, each player on a thread of its own.
-fn play_together(players: &mut [Player], steps: u64) -> Result<(), IllegalAction> {
+fn play_together(players: &mut [Player], steps: u64) -> Result<(), StepError> {
     let threads = players.len() as u64;
     std::thread::scope(|scope| {
         for (player, thread) in players.iter_mut().zip(0..) {

@@ -1,53 +1,48 @@
 //! `mackrl play`: scripted teams, one episode or many.
 
-mod episode;
-mod recording;
 mod statistics;
-mod view;
-
-use std::path::Path;
 
 use anyhow::Context;
-use mackrl::config::{ConfigBuilder, EnvironmentConfig};
+use mackrl::{
+    config::{ConfigBuilder, EnvironmentConfig},
+    replay::record_script,
+};
 use mackrl_env::{EpisodeKey, Stream, registry};
 
 use crate::{
     args::{PlayArgs, with_scenario},
     failure::Failure,
     output,
-    reproduce::meter::Meter,
+    replay::{Opened, Summary},
+    reproduce::Meter,
 };
-use episode::Episode;
-use recording::Recording;
 use statistics::{Row, play_many};
 
 /// The word that stands for every map.
 const ALL: &str = "all";
 
-/// Plays, and prints, records or draws what happened.
+/// Plays, and prints or keeps what happened.
 pub(crate) fn run(args: &PlayArgs) -> anyhow::Result<()> {
-    if let Some(file) = &args.replay {
-        let recording = Recording::read(file)?;
-        let episode = recording.replay(file)?;
-        return one(args, &episode, "replayed, every state as recorded");
-    }
     let maps = maps(args)?;
     let policies = args.policy.policies();
-    if args.record.is_none() && args.svg.is_none() {
+    let Some(file) = &args.save_replay else {
         return many(args, &maps, &policies);
-    }
+    };
     let ([map], [policy]) = (&maps[..], &policies[..]) else {
         return Err(Failure::Usage {
-            message: "--record and --svg take one map and one policy, not `all`".to_owned(),
+            message: "--save-replay takes one map and one policy, not `all`".to_owned(),
         }
         .into());
     };
     let key = EpisodeKey::new(args.seed, Stream::Other, 0);
-    let episode = Episode::play(map, *policy, key)?;
-    if let Some(file) = &args.record {
-        Recording::of(&episode).write(file)?;
+    let replay = record_script(map, *policy, key)?;
+    output::write_file(file, &replay.to_bytes())?;
+    let summary = Summary::of(&Opened::of(replay)?);
+    if args.json {
+        output::print_json(&summary)
+    } else {
+        output::print(&format!("played: {summary}\n"))
     }
-    one(args, &episode, "played")
 }
 
 /// The worlds that were asked for.
@@ -100,35 +95,4 @@ fn many(
         (rows, true) => output::print_json(&rows),
         (rows, false) => output::print(&Row::table(rows)),
     }
-}
-
-/// Draws one episode if asked to, and prints how it went.
-fn one(args: &PlayArgs, episode: &Episode, verb: &str) -> anyhow::Result<()> {
-    if let Some(file) = &args.svg {
-        let step = args.step.unwrap_or(episode.steps.len() / 2);
-        if step > episode.steps.len() {
-            let message = format!(
-                "--step {step} is after the end, expected at most {} in this episode",
-                episode.steps.len()
-            );
-            return Err(Failure::Usage { message }.into());
-        }
-        let picture = view::picture(episode, step);
-        let is_image = file.extension().is_some_and(|name| name == "png");
-        let content = if is_image {
-            picture.to_png()?
-        } else {
-            picture.to_svg().into_bytes()
-        };
-        write(file, &content)?;
-    }
-    let summary = episode.summary();
-    if args.json {
-        return output::print_json(&summary);
-    }
-    output::print(&format!("{verb}: {summary}\n"))
-}
-
-fn write(file: &Path, content: &[u8]) -> anyhow::Result<()> {
-    std::fs::write(file, content).with_context(|| format!("cannot write {}", file.display()))
 }

@@ -3,7 +3,13 @@
 use std::{num::NonZeroUsize, path::PathBuf, thread};
 
 use clap::{Args, ValueEnum, builder::RangedU64ValueParser};
-use mackrl_env::matrix_game::{ObservationDistribution, Payoffs};
+use mackrl::config::EnvironmentConfig;
+use mackrl_env::{
+    matrix_game::{MatrixGameSettings, ObservationDistribution, Payoffs},
+    registry::MATRIX_GAME,
+};
+
+use crate::provenance::{Choice, Judgement, Provenance};
 
 /// Reproduce Figure 5: MACKRL, independent learners and a joint learner on the matrix game.
 ///
@@ -88,6 +94,27 @@ impl Figure5Options {
             self.runs,
             self.seed
         )
+    }
+
+    /// Where a report comes from. Its configuration is the command without the seed.
+    #[must_use]
+    pub(crate) fn provenance(&self) -> Provenance {
+        let env = EnvironmentConfig {
+            map: MATRIX_GAME.to_owned(),
+            matrix_game: MatrixGameSettings {
+                payoffs: self.payoffs.into(),
+                distribution: self.observation.into(),
+                ..MatrixGameSettings::default()
+            },
+            ..EnvironmentConfig::default()
+        };
+        let command = self.command();
+        let settings = command.rsplit_once(" --seed ").map_or("", |(rest, _)| rest);
+        let judgement = Judgement {
+            actions: Choice::Expected,
+            episodes: 0,
+        };
+        Provenance::new(&env, settings, vec![self.seed], judgement)
     }
 }
 

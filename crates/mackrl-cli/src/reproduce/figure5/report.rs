@@ -5,13 +5,15 @@ use mackrl_env::matrix_game::{CommonKnowledge, ObservationDistribution, Payoffs}
 use serde::{Deserialize, Serialize};
 
 use super::{claims::claims, findings::Findings, options::Figure5Options};
-use crate::reproduce::Claim;
+use crate::{provenance::Provenance, reproduce::Claim};
 
 /// Figure 5 in numbers.
 ///
 /// All curves have one entry per point, except the published ones, which have their own points.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Figure5Report {
+    /// Where the numbers come from.
+    pub(crate) provenance: Provenance,
     /// Which payoff matrices were played.
     pub(crate) payoffs: Payoffs,
     /// Who saw the matrix how often.
@@ -139,6 +141,7 @@ impl Figure5Report {
         let quantity = findings.published.quantity;
         let curves = |quantity| Curves::measured(findings.sweep, quantity);
         Self {
+            provenance: options.provenance(),
             payoffs: options.payoffs.into(),
             observation: options.observation.into(),
             quantity,

@@ -1,5 +1,7 @@
 //! The paper's claims about Figure 6, each with the rule by which it is judged.
 
+use mackrl::statistics::mean;
+
 use super::MapRuns;
 use crate::reproduce::{
     Claim, ClaimSource,
@@ -107,10 +109,6 @@ fn some_of(count: usize, share: f64) -> usize {
     (1..=count)
         .find(|&part| part as f64 >= share * count as f64)
         .unwrap_or(count)
-}
-
-fn mean(numbers: &[f64]) -> f64 {
-    numbers.iter().sum::<f64>() / numbers.len() as f64
 }
 
 #[cfg(test)]

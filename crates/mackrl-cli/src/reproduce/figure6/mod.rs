@@ -1,6 +1,6 @@
 //! `mackrl reproduce figure6`: win rates of MACKRL and Central-V during training, on `3m` and `2s3z`.
 //!
-//! Both learners have the same settings, preset `paper`; nothing is tuned for either. Each claim of the paper is judged by a
+//! Both learners have the same settings, those of a preset; nothing is tuned for either. Each claim of the paper is judged by a
 //! rule that is written beside it, and the published curve stands beside ours. Our game is a simulation of the paper's, so
 //! what carries over is the order of the learners, not the height of a curve.
 
@@ -20,6 +20,7 @@ use super::{
     learning::{Curve, Job, Learner, LearningOptions, TrainingRun, train_all},
     write,
 };
+use crate::provenance::Provenance;
 use published::Published;
 
 /// Maps of the figure.
@@ -29,7 +30,7 @@ const LEARNERS: [Learner; 2] = [Learner::Mackrl, Learner::CentralV];
 
 /// Reproduce Figure 6: win rates of MACKRL and Central-V during training, on 3m and 2s3z.
 ///
-/// Trains both learners with preset `paper`, many seeds each, with a greedy test after every interval. A run that is finished in
+/// Trains both learners with one preset, many seeds each, with a greedy test after every interval. A run that is finished in
 /// the folder is not repeated, so the command can be stopped and given again.
 ///
 /// Writes figure6-3m and figure6-2s3z as .svg and .png, and figure6.json, prints the curves beside the published ones, and
@@ -47,8 +48,8 @@ pub(crate) struct Figure6Options {
 pub(crate) struct Figure6Report {
     /// Repeats these numbers.
     pub(crate) command: String,
-    /// Version of this program.
-    pub(crate) version: &'static str,
+    /// Where the runs come from: one entry for each experiment.
+    pub(crate) provenance: Vec<Provenance>,
     /// Seeds of each learner on each map.
     pub(crate) seeds: u64,
     /// Environment steps at each test.
@@ -136,7 +137,7 @@ fn report(options: &LearningOptions, runs: &[TrainingRun]) -> Figure6Report {
         .unwrap_or(0);
     Figure6Report {
         command: options.command("figure6"),
-        version: env!("CARGO_PKG_VERSION"),
+        provenance: TrainingRun::provenance_of(runs),
         seeds: options.seeds,
         steps: (0..tests as u64)
             .map(|test| (test * options.interval).min(options.steps))

@@ -11,13 +11,15 @@ use std::fs;
 
 use anyhow::Context as _;
 use clap::Args;
+use mackrl::statistics::mean_and_standard_error;
 use serde::Serialize;
 
 use super::{
     Claim,
-    learning::{Job, Learner, LearningOptions, TrainingRun, mean_and_error, train_all},
+    learning::{Job, Learner, LearningOptions, TrainingRun, train_all},
     write,
 };
+use crate::provenance::Provenance;
 
 /// Enemies on the map.
 const ENEMIES: usize = 5;
@@ -35,7 +37,7 @@ const PUBLISHED: [[f64; ENEMIES + 1]; 4] = [
 
 /// Reproduce Figure 7: how often pairs delegate, by how many enemies they commonly know, on 2s3z.
 ///
-/// Trains MACKRL with preset `paper` as figure6 does, and looks at four moments of training. Runs that figure6 has finished in
+/// Trains MACKRL as figure6 does, and looks at four moments of training. Runs that figure6 has finished in
 /// the same folder are used as they are.
 ///
 /// Writes figure7.svg, figure7.png and figure7.json, prints the rates beside the published ones, and judges what the paper says.
@@ -52,8 +54,8 @@ pub(crate) struct Figure7Options {
 pub(crate) struct Figure7Report {
     /// Repeats these numbers.
     pub(crate) command: String,
-    /// Version of this program.
-    pub(crate) version: &'static str,
+    /// Where the runs come from: one entry for each experiment.
+    pub(crate) provenance: Vec<Provenance>,
     /// Seeds.
     pub(crate) seeds: u64,
     /// Four moments of training.
@@ -126,7 +128,7 @@ fn report(options: &LearningOptions, runs: &[TrainingRun]) -> Figure7Report {
         .collect();
     Figure7Report {
         command: options.command("figure7"),
-        version: env!("CARGO_PKG_VERSION"),
+        provenance: TrainingRun::provenance_of(runs),
         seeds: options.seeds,
         claims: claims::claims(&moments),
         moments,
@@ -146,7 +148,7 @@ fn interval_at(share: f64, options: &LearningOptions) -> usize {
 fn rate(runs: &[TrainingRun], interval: usize, enemies: usize) -> Rate {
     let of_run = |run: &TrainingRun| *run.delegation.get(interval)?.get(enemies)?;
     let rates: Vec<f64> = runs.iter().filter_map(of_run).collect();
-    let statistics = (rates.len() > 1).then(|| mean_and_error(&rates));
+    let statistics = (rates.len() > 1).then(|| mean_and_standard_error(&rates));
     Rate {
         mean: statistics.map(|(mean, _)| mean),
         sem: statistics.map(|(_, error)| error),

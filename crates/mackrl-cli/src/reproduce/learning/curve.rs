@@ -1,5 +1,6 @@
 //! Means over seeds.
 
+use mackrl::statistics::mean_and_standard_error;
 use serde::{Deserialize, Serialize};
 
 /// Means with their standard errors, one entry per test.
@@ -32,7 +33,9 @@ impl Curve {
         assert!(runs.len() > 1, "a standard error needs two runs");
         let tests = runs.iter().map(|run| run.len()).min().unwrap_or(0);
         let at = |test: usize| runs.iter().map(|run| run[test]).collect::<Vec<f64>>();
-        let (mean, sem) = (0..tests).map(|test| mean_and_error(&at(test))).unzip();
+        let (mean, sem) = (0..tests)
+            .map(|test| mean_and_standard_error(&at(test)))
+            .unzip();
         Self {
             mean,
             sem,
@@ -45,7 +48,10 @@ impl Difference {
     /// Of the means of two samples.
     #[must_use]
     pub(crate) fn between(first: &[f64], second: &[f64]) -> Self {
-        let (first, second) = (mean_and_error(first), mean_and_error(second));
+        let (first, second) = (
+            mean_and_standard_error(first),
+            mean_and_standard_error(second),
+        );
         Self {
             mean: first.0 - second.0,
             error: first.1.hypot(second.1),
@@ -63,14 +69,6 @@ impl std::fmt::Display for Difference {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(formatter, "{:+.3} ± {:.3}", self.mean, self.error)
     }
-}
-
-/// The mean of at least two numbers, and its standard error with the unbiased sample variance.
-pub(crate) fn mean_and_error(sample: &[f64]) -> (f64, f64) {
-    let count = sample.len() as f64;
-    let mean = sample.iter().sum::<f64>() / count;
-    let squares: f64 = sample.iter().map(|x| (x - mean).powi(2)).sum();
-    (mean, (squares / (count - 1.0) / count).sqrt())
 }
 
 #[cfg(test)]

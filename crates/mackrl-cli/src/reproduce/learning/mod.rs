@@ -17,7 +17,7 @@ use std::{
     thread,
 };
 
-pub(crate) use curve::{Curve, Difference, mean_and_error};
+pub(crate) use curve::{Curve, Difference};
 pub(crate) use options::LearningOptions;
 pub(crate) use run::{Job, Learner, TrainingRun};
 

@@ -13,6 +13,11 @@ pub(crate) struct LearningOptions {
     #[arg(long, value_name = "DIR", default_value = "runs/learning")]
     pub(crate) out: PathBuf,
 
+    /// Settings of both learners: paper-code, paper or default. The published figures fit the authors' code, not the paper's
+    /// text.
+    #[arg(long, value_name = "NAME", default_value = "paper-code")]
+    pub(crate) preset: String,
+
     /// Seeds of each learner on each map: 1 to N, at least 2.
     #[arg(
         long,
@@ -43,6 +48,10 @@ pub(crate) struct LearningOptions {
     /// Three seeds and 300 000 steps: to see that it works, not to conclude anything.
     #[arg(long)]
     pub(crate) quick: bool,
+
+    /// Use finished runs of other versions of this program too; the report names them.
+    #[arg(long)]
+    pub(crate) any_code: bool,
 
     /// Runs side by side, each on one thread; changes no result. [default: one for each processor]
     #[arg(long, value_name = "K")]
@@ -75,8 +84,8 @@ impl LearningOptions {
     #[must_use]
     pub(crate) fn command(&self, figure: &str) -> String {
         format!(
-            "mackrl reproduce {figure} --seeds {} --steps {} --interval {}",
-            self.seeds, self.steps, self.interval
+            "mackrl reproduce {figure} --preset {} --seeds {} --steps {} --interval {}",
+            self.preset, self.seeds, self.steps, self.interval
         )
     }
 }
@@ -86,10 +95,12 @@ impl Default for LearningOptions {
     fn default() -> Self {
         Self {
             out: PathBuf::new(),
+            preset: "paper-code".to_owned(),
             seeds: 2,
             steps: 1_000,
             interval: 1_000,
             quick: false,
+            any_code: false,
             jobs: None,
             json: false,
         }

@@ -10,7 +10,11 @@ use mackrl::{
 use serde::{Deserialize, Serialize};
 
 use super::{LearningOptions, PROGRESS_STEPS};
-use crate::reproduce::write;
+use crate::{
+    failure::Failure,
+    provenance::{CODE, Provenance},
+    reproduce::write,
+};
 
 /// Who learns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -41,7 +45,7 @@ impl Learner {
     }
 }
 
-/// A run to be made: a learner on a map with a seed, all else by preset `paper`.
+/// A run to be made: a learner on a map with a seed, all else by a preset.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Job {
     /// The map's name.
@@ -55,6 +59,9 @@ pub(crate) struct Job {
 /// What a run gave.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct TrainingRun {
+    /// Where it comes from; files of early versions do not say.
+    #[serde(default)]
+    provenance: Option<Provenance>,
     /// The whole configuration, as TOML.
     config: String,
     /// Share of battles won at each test: before training, and after each interval.
@@ -62,6 +69,18 @@ pub(crate) struct TrainingRun {
     /// During each interval, the share of chosen pairs that delegated, by the number of enemies they commonly knew; `None`
     /// where that did not occur.
     pub(crate) delegation: Vec<Vec<Option<f64>>>,
+}
+
+impl TrainingRun {
+    /// Where these runs come from, repetitions of one experiment taken together.
+    pub(crate) fn provenance_of(runs: &[Self]) -> Vec<Provenance> {
+        Provenance::merged(runs.iter().map(Self::provenance))
+    }
+
+    fn provenance(&self) -> &Provenance {
+        let provenance = self.provenance.as_ref();
+        provenance.expect("a run has a provenance when it was made, and when it was loaded")
+    }
 }
 
 impl Job {
@@ -75,6 +94,11 @@ impl Job {
         let config = self.config(options)?;
         let path = self.path(options);
         if let Some(run) = load(&path, &config) {
+            let provenance = run.provenance();
+            if provenance.code != CODE && !options.any_code {
+                let code = provenance.code.clone();
+                return Err(Failure::OtherCode { path, code }.into());
+            }
             advance(thousands);
             return Ok(run);
         }
@@ -107,7 +131,7 @@ impl Job {
             format!("run.metrics_interval_steps_env={interval}"),
             format!("test.interval_steps_env={interval}"),
         ];
-        let preset = ConfigBuilder::new().preset("paper")?;
+        let preset = ConfigBuilder::new().preset(&options.preset)?;
         let builder = settings
             .iter()
             .try_fold(preset, |builder, setting| builder.set(setting))?;
@@ -117,7 +141,9 @@ impl Job {
 
 /// A run that was made before with this configuration.
 fn load(path: &PathBuf, config: &Config) -> Option<TrainingRun> {
-    let run: TrainingRun = serde_json::from_str(&fs::read_to_string(path).ok()?).ok()?;
+    let mut run: TrainingRun = serde_json::from_str(&fs::read_to_string(path).ok()?).ok()?;
+    run.provenance
+        .get_or_insert_with(|| Provenance::of_unknown_code(config));
     (run.config == config.to_toml()).then_some(run)
 }
 
@@ -128,6 +154,7 @@ fn train(
 ) -> anyhow::Result<TrainingRun> {
     let mut trainer = Trainer::new(config, 1)?;
     let mut run = TrainingRun {
+        provenance: Some(Provenance::of_run(config)),
         config: config.to_toml(),
         battle_won: Vec::new(),
         delegation: Vec::new(),

@@ -6,9 +6,11 @@ mod layout;
 mod observation;
 mod reward;
 mod state_vector;
+mod view;
 
-pub use environment::{BattleTally, Skirmish};
+pub use environment::Skirmish;
 pub use knowledge::SkirmishKnowledge;
+pub use view::{BattleTally, Face};
 
 #[cfg(test)]
 mod tests;

@@ -7,7 +7,7 @@ use crate::{
             knowledge::SkirmishKnowledge,
             layout::{Layout, TARGET_ACTIONS_FROM},
         },
-        rules::{Battle, Profile, Unit},
+        rules::{BattleState, Battlefield, Profile, Unit},
     },
 };
 
@@ -16,7 +16,10 @@ use crate::{
 pub(super) struct Scene<'a> {
     pub(super) layout: &'a Layout,
     pub(super) knowledge: &'a SkirmishKnowledge,
-    pub(super) battle: &'a Battle,
+    /// What never changes.
+    pub(super) field: &'a Battlefield,
+    /// Everybody, wherever that was learnt.
+    pub(super) state: &'a BattleState,
     pub(super) last_actions: &'a [Option<Action>],
     pub(super) sight_range: f32,
     /// Part of the episode's limit that has passed, in \[0, 1\].
@@ -65,7 +68,7 @@ impl Scene<'_> {
 
     /// Whether `action` is available to `agent`.
     pub(super) fn is_available(&self, agent: usize, action: usize) -> bool {
-        let state = self.battle.state();
+        let state = self.state;
         if !state.units[agent].is_alive() {
             return action == 0;
         }
@@ -83,7 +86,7 @@ impl Scene<'_> {
 
     /// Whether `agent` can choose its target number `target`, which lives and is in range.
     fn can_aim(&self, agent: usize, target: usize) -> bool {
-        let state = self.battle.state();
+        let state = self.state;
         let Some(target) = self.knowledge.target(agent, target) else {
             return false;
         };
@@ -96,7 +99,7 @@ impl Scene<'_> {
 
     /// Entity features \[M, F\]: position, life, shield, kind; zeros for the dead.
     fn write_entities(&self, entity_mf: &mut [f32]) {
-        let state = self.battle.state();
+        let state = self.state;
         for (index, row) in entity_mf
             .chunks_exact_mut(self.layout.entity_features())
             .enumerate()
@@ -128,7 +131,7 @@ impl Scene<'_> {
         observation_o: &mut [f32],
         available_a: &mut [bool],
     ) -> EntitySet {
-        let state = self.battle.state();
+        let state = self.state;
         let own = &state.units[agent];
         available_a.fill(false);
         let observation_o = if self.layout.obs_timestep_number {
@@ -181,7 +184,7 @@ impl Scene<'_> {
 
     /// Walkability and heights around an agent, if shown.
     fn write_ground(&self, agent: usize, row: &mut Cursor<'_>) {
-        let state = self.battle.state();
+        let state = self.state;
         let (x, y) = (state.x[agent], state.y[agent]);
         if self.layout.obs_pathing_grid {
             for value in self.knowledge.pathing(x, y) {
@@ -211,7 +214,7 @@ impl Scene<'_> {
         let can_shoot = self.knowledge.is_in_shooting_range(dx, dy);
         row.put(f32::from(u8::from(flag.unwrap_or(can_shoot))));
         self.write_unit(index, dx, dy, self.layout.enemy_shields, row);
-        let kind = usize::from(self.battle.state().units[index].kind);
+        let kind = usize::from(self.state.units[index].kind);
         row.put_one_hot(self.layout.enemy_type[kind], self.layout.type_bits);
         can_shoot
     }
@@ -224,7 +227,7 @@ impl Scene<'_> {
         *seen |= 1 << ally;
         row.put(1.0);
         self.write_unit(ally, dx, dy, self.layout.ally_shields, row);
-        let kind = usize::from(self.battle.state().units[ally].kind);
+        let kind = usize::from(self.state.units[ally].kind);
         row.put_one_hot(self.layout.ally_type[kind], self.layout.type_bits);
         if self.layout.obs_last_action {
             let last = self.last_actions[ally].map(Action::index);
@@ -234,7 +237,7 @@ impl Scene<'_> {
 
     /// \[distance, x, y\] over the sight range; life and shield if shown.
     fn write_unit(&self, index: usize, dx: f32, dy: f32, shields: usize, row: &mut Cursor<'_>) {
-        let unit = &self.battle.state().units[index];
+        let unit = &self.state.units[index];
         let profile = self.profile(unit);
         row.put((dx * dx + dy * dy).sqrt() / self.sight_range);
         row.put(dx / self.sight_range);
@@ -250,7 +253,7 @@ impl Scene<'_> {
 
     /// Where `index` is relative to `agent`, if it lives and is in sight.
     fn sighted(&self, agent: usize, index: usize) -> Option<(f32, f32)> {
-        let state = self.battle.state();
+        let state = self.state;
         let (dx, dy) = (
             state.x[index] - state.x[agent],
             state.y[index] - state.y[agent],
@@ -260,7 +263,7 @@ impl Scene<'_> {
     }
 
     pub(super) fn profile(&self, unit: &Unit) -> &Profile {
-        &self.battle.field().profiles[usize::from(unit.kind)]
+        &self.field.profiles[usize::from(unit.kind)]
     }
 }
 

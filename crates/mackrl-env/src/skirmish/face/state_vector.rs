@@ -54,7 +54,7 @@ impl Scene<'_> {
     }
 
     fn write_state_ally(&self, agent: usize, cooldown_scales: &[f32], row: &mut Cursor<'_>) {
-        let unit = &self.battle.state().units[agent];
+        let unit = &self.state.units[agent];
         if !unit.is_alive() {
             row.put_zeros(self.layout.state_ally_row());
             return;
@@ -76,7 +76,7 @@ impl Scene<'_> {
     }
 
     fn write_state_enemy(&self, index: usize, row: &mut Cursor<'_>) {
-        let unit = &self.battle.state().units[index];
+        let unit = &self.state.units[index];
         if !unit.is_alive() {
             row.put_zeros(self.layout.state_enemy_row());
             return;
@@ -95,7 +95,7 @@ impl Scene<'_> {
 
     /// Position relative to the middle of the map, over its size.
     fn write_place(&self, index: usize, row: &mut Cursor<'_>) {
-        let state = self.battle.state();
+        let state = self.state;
         let size = MAP_SIZE as f32;
         row.put((state.x[index] - size / 2.0) / size);
         row.put((state.y[index] - size / 2.0) / size);

@@ -56,6 +56,11 @@ impl Play {
         );
         let units = UnitTypes::load(UnitData::Liberty).unwrap();
         let scenario = Scenario::parse("test", &map, &units).unwrap();
+        // Units stand where a test puts them.
+        let settings = SkirmishSettings {
+            spawn_scatter: 0.0,
+            ..settings
+        };
         let mut skirmish = Skirmish::new(Arc::new(scenario), settings).unwrap();
         let mut observations = Observations::new(skirmish.spec(), 1);
         skirmish.reset(
@@ -404,10 +409,12 @@ fn a_battle_in_which_only_medivacs_are_left_is_over() {
         for dead in allies.iter().copied().chain(enemies.iter().map(|i| i + 4)) {
             state.units[dead].life = 0.0;
         }
-        play.skirmish.battle.restore(&state);
+        play.skirmish.encounter.battle.restore(&state);
         let actions: Vec<usize> = (0..4).map(|i| usize::from(!allies.contains(&i))).collect();
         let actions: Vec<Action> = actions.into_iter().map(Action::new).collect();
-        play.skirmish.write(&mut play.observations.row_mut(0));
+        play.skirmish
+            .face
+            .write(&state, &mut play.observations.row_mut(0));
         let step = play
             .skirmish
             .step(&actions, &mut play.observations.row_mut(0))

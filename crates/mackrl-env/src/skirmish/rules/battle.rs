@@ -126,6 +126,13 @@ impl Battle {
         }
     }
 
+    /// Takes a unit off the field: it is dead, without the effects that a death in battle has.
+    pub fn remove(&mut self, unit: UnitIndex) {
+        let unit = &mut self.state.units[usize::from(unit)];
+        unit.life = 0.0;
+        unit.shield = 0.0;
+    }
+
     /// Plays one loop.
     pub fn advance(&mut self, chance: &mut Chance) {
         self.choose_quarries();
@@ -139,15 +146,21 @@ impl Battle {
     }
 
     fn reserve(&mut self, units: usize) {
-        // One missile is in the air for most of a period at worst, so that four per unit are never reached.
-        self.state.missiles.reserve(4 * units);
-        self.state.blows.reserve(4 * units);
-        self.scratch.hits.reserve(4 * units);
-        self.scratch.exploding.reserve(units);
-        self.scratch.treatments.reserve(units);
+        // On the shipped maps four per unit are never reached. A crowd of one's own in front of many beams can have more: then
+        // the list grows once, and stays as long.
+        make_room(&mut self.state.missiles, 4 * units);
+        make_room(&mut self.state.blows, 4 * units);
+        make_room(&mut self.scratch.hits, 4 * units);
+        make_room(&mut self.scratch.exploding, units);
+        make_room(&mut self.scratch.treatments, units);
         self.scratch.destination.resize(units, None);
         self.scratch.footing.resize(units, Footing::Standing);
         self.scratch.steps.resize(units);
         self.scratch.neighbours.reserve(units);
     }
+}
+
+/// Sees to it that `list` can hold `length` elements without growing, those that it holds now included.
+pub(super) fn make_room<T>(list: &mut Vec<T>, length: usize) {
+    list.reserve(length.saturating_sub(list.len()));
 }

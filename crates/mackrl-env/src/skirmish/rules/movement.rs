@@ -76,6 +76,20 @@ impl Battle {
         self.settle();
     }
 
+    /// Pushes everybody apart, as they stand, and off the walls, in so many rounds at most.
+    pub(super) fn part(&mut self, rounds: usize) {
+        for _ in 0..rounds {
+            self.scratch.neighbours.refresh(&self.field, &self.state);
+            self.scratch.steps.x.copy_from_slice(&self.state.x);
+            self.scratch.steps.y.copy_from_slice(&self.state.y);
+            let overlapped = self.push_apart();
+            self.settle();
+            if !overlapped {
+                break;
+            }
+        }
+    }
+
     /// One walker's step, computed from the positions at the loop's beginning.
     fn step_forward(&mut self, index: usize, to: [f32; 2]) {
         let (x, y) = (self.state.x[index], self.state.y[index]);

@@ -5,7 +5,7 @@
 //! computes does not depend on when they were renewed: a battle that is restored from its state goes on to the same bits.
 
 use crate::skirmish::{
-    rules::{BattleState, Battlefield, movement::LOOKAHEAD},
+    rules::{BattleState, Battlefield, battle::make_room, movement::LOOKAHEAD},
     unit_types::Layer,
 };
 
@@ -33,9 +33,9 @@ pub(super) struct Neighbours {
 
 impl Neighbours {
     pub(super) fn reserve(&mut self, units: usize) {
-        self.list.reserve(units * units);
-        self.begin.reserve(units + 1);
-        self.middle.reserve(units);
+        make_room(&mut self.list, units * units);
+        make_room(&mut self.begin, units + 1);
+        make_room(&mut self.middle, units);
         self.listed_x.resize(units, 0.0);
         self.listed_y.resize(units, 0.0);
         self.radius.resize(units, 0.0);

@@ -1,6 +1,10 @@
-//! Where the units of a group appear.
+//! Where the units of a group appear: the places of a map, and how far from them a battle begins.
 
-use crate::skirmish::{rules::Profile, terrain::Terrain, unit_types::Layer};
+use crate::skirmish::{
+    rules::{Battle, BattleState, Chance, Profile, movement::Footing},
+    terrain::Terrain,
+    unit_types::Layer,
+};
 
 /// A place that somebody has.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,6 +21,8 @@ pub struct Taken {
 const LATTICE: f32 = 0.25;
 /// Lattice steps from the point to the farthest place tried.
 const REACH: i32 = 64;
+/// Rounds of pushing apart after a scatter, at most; a few suffice where there is room.
+const SCATTER_ROUNDS: usize = 32;
 
 /// Finds places for units of the given profiles around a point: each takes the free place nearest to the point, so the first
 /// stands on it and the others surround it compactly. Of equally near places those towards `front`, where the other side is,
@@ -67,15 +73,62 @@ pub fn spread_around(
         .collect()
 }
 
+impl Battle {
+    /// Moves everybody who can walk aside, by up to `scatter` map units along each axis, and lets them push one another apart:
+    /// the armies of one map stand a little differently in every battle, and are no mirror images.
+    ///
+    /// On the bare lattice the same shots fall in the same loops in nearly every battle: two equal armies of which one attacks
+    /// whoever is nearest then win all battles on one map and none on another, which no player would recognise.
+    pub fn scatter(&mut self, scatter: f32, chance: &mut Chance) {
+        let field = self.field.clone();
+        for index in 0..self.state.units.len() {
+            let profile = &field.profiles[usize::from(self.state.units[index].kind)];
+            let x = self.state.x[index] + chance.between(-scatter, scatter);
+            let y = self.state.y[index] + chance.between(-scatter, scatter);
+            self.scratch.footing[index] = if profile.is_immobile() {
+                Footing::Braced
+            } else {
+                (self.state.x[index], self.state.y[index]) =
+                    off_walls([x, y], profile, &field.terrain);
+                Footing::Standing
+            };
+        }
+        self.part(SCATTER_ROUNDS);
+    }
+
+    /// Exchanges places among units of one kind so that they stand in the order of x, then y. `units` are sorted by kind.
+    pub fn sort_places(&mut self, units: std::ops::Range<usize>) {
+        let BattleState {
+            x, y, units: who, ..
+        } = &mut self.state;
+        let begin = units.start;
+        for sorted in units {
+            let mut index = sorted;
+            while index > begin
+                && who[index].kind == who[index - 1].kind
+                && (x[index], y[index]) < (x[index - 1], y[index - 1])
+            {
+                x.swap(index, index - 1);
+                y.swap(index, index - 1);
+                index -= 1;
+            }
+        }
+    }
+}
+
 fn is_free([x, y]: [f32; 2], profile: &Profile, terrain: &Terrain, taken: &[Taken]) -> bool {
     let is_clear_of_units = taken.iter().all(|other| {
         let (dx, dy) = (x - other.at[0], y - other.at[1]);
         let apart = other.radius + profile.separation_radius;
         !profile.layer.collides_with(other.layer) || dx * dx + dy * dy >= apart * apart
     });
-    let off_walls = terrain.for_layer(profile.layer).map_or_else(
+    is_clear_of_units && off_walls([x, y], profile, terrain) == (x, y)
+}
+
+/// The place nearest to (x, y), nearly, where a unit of the given profile is in no wall.
+fn off_walls([x, y]: [f32; 2], profile: &Profile, terrain: &Terrain) -> (f32, f32) {
+    terrain.for_layer(profile.layer).map_or_else(
         || Terrain::within_map(x, y),
         |terrain| terrain.pushed_out_of_walls(x, y, profile.inner_radius),
-    );
-    is_clear_of_units && off_walls == (x, y)
+    )
 }

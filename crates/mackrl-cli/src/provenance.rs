@@ -1,0 +1,274 @@
+//! Where a result comes from: code, map data, configuration, seeds, and how the team was judged.
+//!
+//! Every result carries a [`Provenance`], so that results which differ in more than their seeds are not taken for repetitions of
+//! one experiment. It stands
+//!
+//! - in full in `run.json` of a run folder, as the list `provenance`: one entry, and one more for each other version of this
+//!   program that went on with the run;
+//! - by its `id` in every row of `metrics.jsonl`, as `provenance`;
+//! - in full in `provenance` of what `evaluate --json` and `certify --json` print and of every file of `reproduce`, which has a
+//!   list where several experiments meet in a file.
+//!
+//! Nothing in it depends on the clock, the machine, the folder or the number of threads: equal work has an equal provenance.
+
+use mackrl::config::{Config, EnvironmentConfig};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+/// The version of the code that results come from: the crates' version and the first digits of the hash of the libraries'
+/// sources and data (see `build.rs`).
+pub(crate) const CODE: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("MACKRL_SOURCE"));
+
+/// [`Provenance::code`] of results that do not say.
+const UNKNOWN: &str = "unknown";
+
+/// Hexadecimal digits of an id.
+const ID_DIGITS: usize = 16;
+
+/// Where a result comes from.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Provenance {
+    /// Names this provenance: the first 16 digits of the SHA-256 of all that follows.
+    pub(crate) id: String,
+    /// [`CODE`] of the program that made the result.
+    pub(crate) code: String,
+    /// The map's name.
+    pub(crate) map: String,
+    /// SHA-256 of the map's file and the unit statistics it is played with: `cat maps/3m.toml units/liberty.toml | sha256sum`.
+    pub(crate) map_sha256: String,
+    /// SHA-256 of the configuration without its seed, equal for the repetitions of an experiment:
+    /// `grep -v '^seed = ' config.toml | sha256sum`.
+    pub(crate) config_sha256: String,
+    /// The seeds of the runs in the result, or of the episodes if only episodes were played.
+    pub(crate) seeds: Vec<u64>,
+    /// How the team was judged.
+    pub(crate) evaluation: Judgement,
+    /// SHA-256 of the weights that played, if the result is about given weights.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) weights_sha256: Option<String>,
+}
+
+/// How a team is judged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Judgement {
+    /// How actions are chosen.
+    pub(crate) actions: Choice,
+    /// Episodes of a judgement; 0 if expectations are computed and none is played.
+    pub(crate) episodes: usize,
+}
+
+/// How actions are chosen when a team is judged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Choice {
+    /// The most likely ones.
+    Greedy,
+    /// Sampled in some episodes, greedy in as many others.
+    SampledAndGreedy,
+    /// All of them, weighted by their probabilities.
+    Expected,
+}
+
+impl Provenance {
+    /// Of a training run: judged by its greedy tests.
+    pub(crate) fn of_run(config: &Config) -> Self {
+        let judgement = Judgement {
+            actions: Choice::Greedy,
+            episodes: config.test.episodes,
+        };
+        Self::new(
+            &config.env,
+            &without_seed(config),
+            vec![config.run.seed],
+            judgement,
+        )
+    }
+
+    /// Of a training run by a version of the code that is not known.
+    pub(crate) fn of_unknown_code(config: &Config) -> Self {
+        let provenance = Self {
+            code: UNKNOWN.to_owned(),
+            ..Self::of_run(config)
+        };
+        provenance.identified()
+    }
+
+    /// Of results taken together: one for each experiment, with the seeds of all its repetitions.
+    pub(crate) fn merged<'a>(of: impl IntoIterator<Item = &'a Self>) -> Vec<Self> {
+        let mut experiments: Vec<Self> = Vec::new();
+        for one in of {
+            let same = |other: &&mut Self| one.differences(other).is_empty();
+            match experiments.iter_mut().find(same) {
+                Some(experiment) => experiment.seeds.extend(&one.seeds),
+                None => experiments.push(one.clone()),
+            }
+        }
+        experiments.into_iter().map(Self::identified).collect()
+    }
+
+    /// Of episodes that these weights played, drawn from `seed`.
+    pub(crate) fn of_weights(
+        config: &Config,
+        weights: &[u8],
+        seed: u64,
+        judgement: Judgement,
+    ) -> Self {
+        let mut provenance = Self::of_run(config);
+        provenance.seeds = vec![seed];
+        provenance.evaluation = judgement;
+        provenance.weights_sha256 = Some(sha256(weights));
+        provenance.identified()
+    }
+
+    /// Of work in the world `env` that `settings` describe in words of their own.
+    pub(crate) fn new(
+        env: &EnvironmentConfig,
+        settings: &str,
+        seeds: Vec<u64>,
+        evaluation: Judgement,
+    ) -> Self {
+        let provenance = Self {
+            id: String::new(),
+            code: CODE.to_owned(),
+            map: env.map.clone(),
+            map_sha256: sha256(env.data().as_bytes()),
+            config_sha256: sha256(settings.as_bytes()),
+            seeds,
+            evaluation,
+            weights_sha256: None,
+        };
+        provenance.identified()
+    }
+
+    /// What makes this another experiment than `other`: the names of the fields that differ, seeds and weights aside.
+    pub(crate) fn differences(&self, other: &Self) -> Vec<&'static str> {
+        let fields = [
+            ("code", self.code != other.code),
+            (
+                "map",
+                (&self.map, &self.map_sha256) != (&other.map, &other.map_sha256),
+            ),
+            ("config", self.config_sha256 != other.config_sha256),
+            ("evaluation", self.evaluation != other.evaluation),
+        ];
+        let differing = fields.into_iter().filter(|(_, differs)| *differs);
+        differing.map(|(name, _)| name).collect()
+    }
+
+    fn identified(mut self) -> Self {
+        self.id.clear();
+        let json = serde_json::to_vec(&self).expect("a provenance can be written");
+        self.id = sha256(&json)[..ID_DIGITS].to_owned();
+        self
+    }
+}
+
+/// The configuration as a run folder holds it, without the line of its seed.
+fn without_seed(config: &Config) -> String {
+    let text = config.to_toml();
+    let lines = text.lines().filter(|line| !line.starts_with("seed = "));
+    lines.flat_map(|line| [line, "\n"]).collect()
+}
+
+/// SHA-256 in hexadecimal, as `sha256sum` prints it.
+pub(crate) fn sha256(content: &[u8]) -> String {
+    hexadecimal(&Sha256::digest(content))
+}
+
+/// Two digits for each byte.
+pub(crate) fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn provenance(change: impl FnOnce(&mut Config)) -> Provenance {
+        let mut config = Config::default();
+        change(&mut config);
+        Provenance::of_run(&config)
+    }
+
+    #[test]
+    fn repetitions_differ_in_their_seeds_and_ids_alone() {
+        let one = provenance(|_| ());
+        let other = provenance(|config| config.run.seed = 7);
+        assert_eq!(one, provenance(|_| ()));
+        assert_ne!(one.id, other.id);
+        assert_eq!(one.differences(&other), [""; 0]);
+        assert_eq!(
+            Provenance {
+                id: one.id.clone(),
+                seeds: vec![1],
+                ..other
+            },
+            one
+        );
+    }
+
+    #[test]
+    fn whatever_makes_another_experiment_is_named() {
+        let one = provenance(|_| ());
+        let gamma = provenance(|config| config.learner.gamma = 0.5);
+        assert_eq!(one.differences(&gamma), ["config"]);
+        let map = provenance(|config| config.env.map = "2s3z".to_owned());
+        assert_eq!(one.differences(&map), ["map", "config"]);
+        let tests = provenance(|config| config.test.episodes = 5);
+        assert_eq!(one.differences(&tests), ["config", "evaluation"]);
+        let code = Provenance {
+            code: "0.0.1+x".to_owned(),
+            ..one.clone()
+        };
+        assert_eq!(one.differences(&code), ["code"]);
+    }
+
+    #[test]
+    fn repetitions_are_merged_and_experiments_are_not() {
+        let one = provenance(|_| ());
+        let two = provenance(|config| config.run.seed = 2);
+        let gamma = provenance(|config| config.learner.gamma = 0.5);
+        let merged = Provenance::merged([&one, &gamma, &two]);
+        assert_eq!(merged.len(), 2);
+        assert_eq!((&merged[0].seeds, &merged[1]), (&vec![1, 2], &gamma));
+        assert_ne!(merged[0].id, one.id);
+        let unknown = Provenance::of_unknown_code(&Config::default());
+        assert_eq!(unknown.differences(&one), ["code"]);
+    }
+
+    /// `cat maps/3m.toml units/liberty.toml | sha256sum`, and the same for the matrix game's payoffs.
+    #[test]
+    fn map_data_are_the_files_of_map_and_units() {
+        let files = concat!(
+            include_str!("../../../maps/3m.toml"),
+            include_str!("../../../units/liberty.toml")
+        );
+        assert_eq!(provenance(|_| ()).map_sha256, sha256(files.as_bytes()));
+        let lotv = provenance(|config| {
+            config.env.settings.units = mackrl_env::skirmish::UnitData::Lotv;
+        });
+        assert_ne!(lotv.map_sha256, provenance(|_| ()).map_sha256);
+        let game = provenance(|config| config.env.map = "matrix-game".to_owned());
+        let payoffs = "1 0 0 0.4 0\n0 0.2 0.4 0.8 0.4\n0 0 0 0.4 0\n0 0 0 0.2 0\n0 0 0 0 0\n\
+                       0 0 0.2 0 1\n0 0 0.4 0 0\n0.2 0.4 0.8 0.4 0.2\n0 0 0.4 0 0\n0 0 0.2 0 0\n";
+        assert_eq!(game.map_sha256, sha256(payoffs.as_bytes()));
+    }
+
+    #[test]
+    fn the_code_has_a_version_and_the_hash_of_its_sources() {
+        let (version, source) = CODE.split_once('+').unwrap();
+        assert_eq!(version, env!("CARGO_PKG_VERSION"));
+        assert_eq!(source.len(), 12);
+    }
+
+    #[test]
+    fn the_seed_is_the_only_line_that_a_configuration_is_hashed_without() {
+        let config = Config::default();
+        let hashed = without_seed(&config);
+        assert_eq!(
+            config.to_toml().replace("seed = 1\n", ""),
+            hashed,
+            "{hashed}"
+        );
+    }
+}

@@ -1,0 +1,138 @@
+//! From a replay to the picture of one of its moments.
+
+use mackrl::{policy::Choice, replay::Moment};
+use mackrl_env::{
+    AgentId, EntityId, EntitySet, Environment,
+    skirmish::{
+        rules::{BattleState, Order, Team},
+        terrain::MAP_SIZE,
+    },
+};
+
+use super::Opened;
+use crate::plot::{BattlePicture, Figure, Lens, Link, Shot, Side};
+
+/// Agents outside the group whose fields of view are drawn too; more would hide the battle.
+const OTHERS_SHOWN: usize = 3;
+
+/// What is seen after `step` steps, with what everybody did in the step before, the pairs that are formed now, and what `group`
+/// knows, if it has members.
+pub(crate) fn picture(opened: &Opened, step: usize, group: &[AgentId]) -> BattlePicture {
+    let playback = &opened.playback;
+    let scenario = playback.skirmish.scenario();
+    let moment = &playback.moments[step];
+    let (state, before) = (
+        &moment.state,
+        &playback.moments[step.saturating_sub(1)].state,
+    );
+    let terrain = &scenario.field.terrain;
+    let cells = 0..i32::try_from(MAP_SIZE).unwrap_or(i32::MAX);
+    let rewards = playback.reward_t.iter().take(step);
+    let total: f64 = rewards.map(|reward| f64::from(*reward)).sum();
+    BattlePicture {
+        title: format!("{}, step {step}", playback.skirmish.spec().name),
+        subtitle: format!(
+            "{} against the game, seed {}, {} allies and {} enemies alive, return so far {total:.1}",
+            opened.replay.player.name(),
+            opened.replay.key.seed,
+            state.living(Team::Ally),
+            state.living(Team::Enemy),
+        ),
+        walkable: cells
+            .clone()
+            .flat_map(|y| cells.clone().map(move |x| (x, y)))
+            .map(|(x, y)| terrain.is_walkable(x, y))
+            .collect(),
+        edge: MAP_SIZE,
+        ground_shown: Vec::new(),
+        figures: (0..state.units.len())
+            .map(|index| figure(opened, state, before, index))
+            .collect(),
+        shots: (0..state.units.len())
+            .filter_map(|index| shot(state, before, index))
+            .collect(),
+        missiles: (state.missiles.iter())
+            .map(|missile| [missile.x, missile.y].map(f64::from))
+            .collect(),
+        sight: f64::from(playback.skirmish.settings().sight_range),
+        links: links(opened, step),
+        lens: (!group.is_empty()).then(|| lens(moment, group)),
+    }
+}
+
+fn figure(opened: &Opened, state: &BattleState, before: &BattleState, index: usize) -> Figure {
+    let scenario = opened.playback.skirmish.scenario();
+    let unit = &state.units[index];
+    let profile = &scenario.field.profiles[usize::from(unit.kind)];
+    let place = |state: &BattleState| [state.x[index], state.y[index]].map(f64::from);
+    Figure {
+        side: match unit.team {
+            Team::Ally => Side::Ally,
+            Team::Enemy => Side::Enemy,
+        },
+        kind: opened.names.kind(EntityId::new(index)).to_owned(),
+        name: opened.names.entity(EntityId::new(index)),
+        at: place(state),
+        from: place(before),
+        radius: f64::from(profile.radius),
+        is_alive: unit.is_alive(),
+        life: f64::from(unit.life / profile.life),
+        shield: (profile.shield > 0.0).then(|| f64::from(unit.shield / profile.shield)),
+    }
+}
+
+/// Whom a living unit is aiming at or healing, and whether it has attacked since `before`: then its weapon reloads for longer than it
+/// did.
+pub(super) fn shot(state: &BattleState, before: &BattleState, index: usize) -> Option<Shot> {
+    let unit = &state.units[index];
+    let target = match unit.order {
+        Order::Attack { target } | Order::Heal { target } => Some(target),
+        Order::Stop | Order::Move { .. } | Order::AttackMove { .. } | Order::Hunt => unit.quarry,
+    };
+    let target = usize::from(target?);
+    let is_shown = unit.is_alive() && before.units[target].is_alive();
+    is_shown.then(|| Shot {
+        from: index,
+        to: target,
+        has_fired: unit.cooldown > before.units[index].cooldown,
+    })
+}
+
+/// The pairs of living agents that the partition chosen at this step contains.
+fn links(opened: &Opened, step: usize) -> Vec<Link> {
+    let step = opened.replay.steps.get(step);
+    let thought = step.and_then(|step| step.thought.as_ref());
+    let pairs = thought.into_iter().flat_map(|thought| &thought.pairs);
+    pairs
+        .filter_map(|pair| {
+            Some(Link {
+                members: pair.members.map(AgentId::index),
+                is_joint: pair.choice? == Choice::Joint,
+            })
+        })
+        .collect()
+}
+
+fn lens(moment: &Moment, group: &[AgentId]) -> Lens {
+    let visible_n = &moment.visible_n;
+    let knowledge = mackrl::replay::GroupKnowledge::of(group, visible_n);
+    let members: Vec<usize> = group.iter().map(|agent| agent.index()).collect();
+    let living = |agent: &usize| !visible_n[*agent].is_empty();
+    let others: Vec<usize> = (0..visible_n.len())
+        .filter(|agent| living(agent) && !members.contains(agent))
+        .collect();
+    let mut fields: Vec<usize> = members.iter().copied().filter(living).collect();
+    if others.len() <= OTHERS_SHOWN {
+        fields.extend(others);
+    }
+    let seen = (group.iter()).fold(EntitySet::EMPTY, |seen, agent| {
+        seen.union(visible_n[agent.index()])
+    });
+    let indices = |set: EntitySet| set.iter().map(EntityId::index).collect();
+    Lens {
+        common: indices(knowledge.common),
+        other: indices(seen.difference(knowledge.common)),
+        members,
+        fields,
+    }
+}

@@ -1,0 +1,82 @@
+//! How a recorded episode went, in one line or one object.
+
+use std::fmt;
+
+use mackrl_env::EpisodeStatistics;
+use serde::Serialize;
+
+use super::Opened;
+
+/// How an episode went.
+#[derive(Debug, Serialize)]
+pub(crate) struct Summary {
+    map: String,
+    policy: String,
+    seed: u64,
+    episode: u64,
+    battle_won: bool,
+    #[serde(rename = "return")]
+    total: f64,
+    ep_length: usize,
+    dead_allies: usize,
+    dead_enemies: usize,
+    state_hash: String,
+}
+
+impl Summary {
+    /// Of a replay.
+    pub(crate) fn of(opened: &Opened) -> Self {
+        let Opened {
+            replay, playback, ..
+        } = opened;
+        let EpisodeStatistics {
+            battle_won,
+            dead_allies,
+            dead_enemies,
+        } = playback.statistics;
+        Self {
+            map: replay.env.map.clone(),
+            policy: replay.player.name(),
+            seed: replay.key.seed,
+            episode: replay.key.episode,
+            battle_won,
+            total: (playback.reward_t.iter())
+                .map(|reward| f64::from(*reward))
+                .sum(),
+            ep_length: playback.steps(),
+            dead_allies,
+            dead_enemies,
+            state_hash: format!("{:016x}", playback.skirmish.state_hash()),
+        }
+    }
+}
+
+impl Summary {
+    /// How it ended.
+    pub(super) fn outcome(&self) -> String {
+        format!(
+            "{} after {} steps, return {:.2}, allies lost: {}, enemies lost: {}",
+            if self.battle_won { "won" } else { "not won" },
+            self.ep_length,
+            self.total,
+            self.dead_allies,
+            self.dead_enemies
+        )
+    }
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            map,
+            policy,
+            state_hash,
+            ..
+        } = self;
+        let outcome = self.outcome();
+        write!(
+            formatter,
+            "{map} by {policy}, {outcome}, state {state_hash}"
+        )
+    }
+}
