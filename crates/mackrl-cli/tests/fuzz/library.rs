@@ -1,11 +1,20 @@
-//! Files that the libraries read: configuration, scenarios, weights, checkpoints.
+//! Files that the libraries read: configuration, scenarios, weights, checkpoints, replays.
+
+use std::io::{Read, Write};
 
 use fastrand::Rng;
+use flate2::{Compression, read::GzDecoder, write::GzEncoder};
 use mackrl::{
     config::{Config, ConfigBuilder, presets},
+    replay::{Replay, record_script},
     training::{Checkpoint, Trainer, assembly, read_weights},
 };
-use mackrl_env::{random_play::RandomPlay, registry, skirmish::SkirmishSettings};
+use mackrl_env::{
+    EpisodeKey, Stream,
+    random_play::RandomPlay,
+    registry,
+    skirmish::{SkirmishSettings, scripted::ScriptedPolicy},
+};
 
 use crate::{Target, mutation};
 
@@ -247,6 +256,73 @@ impl Target for Checkpoints {
                 Ok(_) | Err(mackrl::Error::NotFinite { .. }) => Ok(()),
                 Err(error) => Err(format!("a restored run cannot go on: {error}")),
             },
+        }
+    }
+}
+
+/// Replays: packed lines of JSON.
+pub(crate) struct Replays;
+
+fn unpacked(packed: &[u8]) -> Vec<u8> {
+    let mut text = Vec::new();
+    // What a spoilt archive held before it broke is as good.
+    let _ = GzDecoder::new(packed).read_to_end(&mut text);
+    text
+}
+
+fn packed(text: &[u8]) -> Vec<u8> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+    encoder.write_all(text).expect("memory takes all");
+    encoder.finish().expect("memory takes all")
+}
+
+impl Target for Replays {
+    fn name(&self) -> &'static str {
+        "replay"
+    }
+
+    fn seeds(&self) -> Vec<Vec<u8>> {
+        let config = Config::default();
+        let key = EpisodeKey::new(1, Stream::Evaluation, 1);
+        let replay = record_script(&config.env, ScriptedPolicy::FocusFire, key);
+        vec![replay.expect("a scripted battle").to_bytes()]
+    }
+
+    fn words(&self) -> Vec<String> {
+        [
+            "env",
+            "map",
+            "scenario",
+            "\"27m_vs_30m\"",
+            "actions",
+            "steps",
+            "key",
+            "null",
+            "\\u0000",
+            "[]",
+            "thought",
+        ]
+        .map(str::to_owned)
+        .to_vec()
+    }
+
+    fn input(&self, seeds: &[Vec<u8>], words: &[String], rng: &mut Rng) -> Vec<u8> {
+        if rng.u8(..4) == 0 {
+            return mutation::mutated(seeds, words, rng);
+        }
+        let texts: Vec<Vec<u8>> = seeds.iter().map(|seed| unpacked(seed)).collect();
+        packed(&mutation::mutated(&texts, words, rng))
+    }
+
+    fn read(&mut self, input: &[u8]) -> Result<(), String> {
+        let Ok(replay) = Replay::from_bytes(input) else {
+            return Ok(());
+        };
+        match replay.play() {
+            Ok(playback) if playback.steps() != replay.steps.len() => {
+                Err("not all steps were played".to_owned())
+            }
+            _ => Ok(()),
         }
     }
 }

@@ -70,7 +70,7 @@ fn targets() -> Vec<Box<dyn Target>> {
         Box::new(library::Scenario),
         Box::new(library::Weights::default()),
         Box::new(library::Checkpoints::default()),
-        Box::new(program::Recordings::default()),
+        Box::new(library::Replays),
         Box::new(program::RunFolders::default()),
     ]
 }

@@ -1,4 +1,4 @@
-//! Files that the program itself reads: recordings and run folders. They are given to `mackrl`, with a limit on its memory.
+//! What the program itself reads: run folders. They are given to `mackrl`, with a limit on its memory.
 
 use std::{
     fs,
@@ -15,7 +15,7 @@ use crate::{Target, mutation};
 
 /// Memory that the program may ask for, in KiB: address space, of which threads and the program itself take most.
 const ADDRESSES_MAX_KIB: usize = 1 << 20;
-/// Time that the program may take to read a file and to play what stands in it, on a busy machine.
+/// Time that the program may take to read a run and to play an episode, on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(20);
 /// Time after which a run that goes on is left: a stranger's settings may ask for a long one.
 const TRAINING_WATCHED: Duration = Duration::from_secs(3);
@@ -84,52 +84,6 @@ fn succeed(line: &str, folder: &Path) {
 
 fn folder() -> TempDir {
     tempfile::tempdir().expect("a folder")
-}
-
-/// Episodes as `mackrl play --record` writes them.
-pub(crate) struct Recordings {
-    folder: TempDir,
-}
-
-impl Default for Recordings {
-    fn default() -> Self {
-        Self { folder: folder() }
-    }
-}
-
-impl Target for Recordings {
-    fn name(&self) -> &'static str {
-        "recording"
-    }
-
-    fn seeds(&self) -> Vec<Vec<u8>> {
-        succeed("play --map 3m --record sound.json", self.folder.path());
-        vec![fs::read(self.folder.path().join("sound.json")).expect("a recording")]
-    }
-
-    fn words(&self) -> Vec<String> {
-        [
-            "env",
-            "map",
-            "scenario",
-            "\"27m_vs_30m\"",
-            "actions",
-            "state_hash",
-            "steps",
-            "key",
-            "null",
-            "\\u0000",
-            "../../x",
-        ]
-        .map(str::to_owned)
-        .to_vec()
-    }
-
-    fn read(&mut self, input: &[u8]) -> Result<(), String> {
-        let folder = self.folder.path();
-        fs::write(folder.join("stranger.json"), input).map_err(|error| error.to_string())?;
-        run(&["play", "--replay", "stranger.json"], folder)
-    }
 }
 
 /// Run folders. An input is a list of changes to a sound one: `file NUL what NUL content NUL`, so that inputs can be kept as files.
