@@ -157,11 +157,14 @@ fn delimited(message: &mut Vec<u8>, field: u8, content: &[u8]) {
 
 /// Seven bits a byte, the lowest first; the eighth says that more follow.
 fn variable(message: &mut Vec<u8>, mut number: u64) {
-    while number >= 0x80 {
-        message.push((number & 0x7f) as u8 | 0x80);
+    loop {
+        let [lowest, ..] = number.to_le_bytes();
         number >>= 7;
+        if number == 0 {
+            return message.push(lowest & 0x7f);
+        }
+        message.push(lowest | 0x80);
     }
-    message.push(number as u8);
 }
 
 /// Length and data, each with its checksum.

@@ -22,6 +22,7 @@ use std::{
     fs,
     panic::{AssertUnwindSafe, catch_unwind},
     path::{Path, PathBuf},
+    str::FromStr,
     time::{Duration, Instant},
 };
 
@@ -86,7 +87,7 @@ fn no_file_makes_the_program_panic_or_take_more_than_its_share() {
         return attempt(&mut *targets[0], &input).expect("the input is refused or used");
     }
     let seconds = number("MACKRL_FUZZ_SECONDS").unwrap_or(SECONDS);
-    let seed = number("MACKRL_FUZZ_SEED").unwrap_or(1.0) as u64;
+    let seed = number("MACKRL_FUZZ_SEED").unwrap_or(1);
     let share = Duration::from_secs_f64(seconds / targets.len() as f64);
     for target in &mut targets {
         let cases = fuzz(&mut **target, seed, share);
@@ -171,7 +172,7 @@ fn corpus(target: &str) -> Vec<Vec<u8>> {
         .collect()
 }
 
-fn number(variable: &str) -> Option<f64> {
+fn number<N: FromStr>(variable: &str) -> Option<N> {
     let text = std::env::var(variable).ok()?;
     Some(
         text.parse()

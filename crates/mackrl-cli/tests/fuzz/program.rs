@@ -158,11 +158,7 @@ impl RunFolders {
     /// Makes the manifest agree with what it lists, so that what lies behind the hashes is read.
     fn mend(&self, run: &Path) {
         let place = self.place(run, "CHECKPOINT/manifest.json");
-        let plain =
-            fs::symlink_metadata(&place).is_ok_and(|data| data.is_file() && data.len() < 1 << 20);
-        let text = plain
-            .then(|| fs::read(&place).unwrap_or_default())
-            .unwrap_or_default();
+        let text = plain(&place).unwrap_or_default();
         let Ok(mut manifest) = serde_json::from_slice::<serde_json::Value>(&text) else {
             return;
         };
@@ -184,12 +180,18 @@ impl RunFolders {
     }
 }
 
-/// Length and hash of a plain file that is not too long.
+/// The content of a plain file that is not too long: a pipe would block, and a link lead elsewhere.
+fn plain(path: &Path) -> Option<Vec<u8>> {
+    let metadata = fs::symlink_metadata(path).ok()?;
+    let plain = metadata.is_file() && metadata.len() < 1 << 20;
+    if plain { fs::read(path).ok() } else { None }
+}
+
+/// Length and hash of a plain file.
 fn fingerprint(path: &Path) -> Option<serde_json::Value> {
     use sha2::{Digest, Sha256};
 
-    let plain = fs::symlink_metadata(path).is_ok_and(|data| data.is_file() && data.len() < 1 << 20);
-    let content = plain.then(|| fs::read(path).ok())??;
+    let content = plain(path)?;
     let hash: String = Sha256::digest(&content)
         .iter()
         .map(|byte| format!("{byte:02x}"))
@@ -276,7 +278,7 @@ impl Target for RunFolders {
         fs::write(&outside, MINE_CONTENT).map_err(|error| error.to_string())?;
         let run_folder = self.folder.path().join("run");
         copy(&self.sound(), &run_folder);
-        if input.len() % 3 > 0 {
+        if !input.len().is_multiple_of(3) {
             // Then the weights are those of the checkpoint.
             let _ = fs::remove_file(run_folder.join("weights.safetensors"));
         }
@@ -290,7 +292,7 @@ impl Target for RunFolders {
                 &bytes(change[2]),
             );
         }
-        if input.len() % 4 > 0 {
+        if !input.len().is_multiple_of(4) {
             self.mend(&run_folder);
         }
         let before = names(self.folder.path());
