@@ -32,6 +32,11 @@ pub(crate) enum Failure {
     BadData { message: String },
     /// A result of another version of this program, among which results of this one were to stand.
     OtherCode { path: PathBuf, code: String },
+    /// StarCraft II is not as it has to be.
+    NotReady {
+        /// How much is wrong.
+        problems: usize,
+    },
     /// A team that does not run decentralised.
     CertificateFailed { mismatches: u64 },
     /// Flags that do not go together.
@@ -83,6 +88,12 @@ impl fmt::Display for Failure {
             | Self::Usage { message }
             | Self::ReplayDiffers { message }
             | Self::OtherSimulator { message, .. } => formatter.write_str(message),
+            Self::NotReady { problems } => {
+                write!(
+                    formatter,
+                    "StarCraft II cannot be played on here: problems: {problems}"
+                )
+            }
             Self::CertificateFailed { mismatches } => write!(
                 formatter,
                 "not decentralised: {mismatches} actions differ from the central run"
@@ -166,11 +177,13 @@ fn exit_of(cause: &(dyn std::error::Error + 'static)) -> Option<Exit> {
             | Failure::ReplayDiffers { .. }
             | Failure::OtherSimulator { .. } => Exit::Data,
             Failure::CertificateFailed { .. } => Exit::CertificateFailed,
+            Failure::NotReady { .. } => Exit::InputOutput,
         });
     }
     if let Some(error) = cause.downcast_ref::<mackrl::Error>() {
         return Some(match error {
             mackrl::Error::Config(_) => Exit::Configuration,
+            mackrl::Error::Step(mackrl_env::StepError::Interrupted(_)) => Exit::InputOutput,
             mackrl::Error::Data(_) | mackrl::Error::NotFinite { .. } => Exit::Data,
             _ => Exit::Defect,
         });

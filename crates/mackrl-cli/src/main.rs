@@ -39,6 +39,7 @@ fn main() -> ExitCode {
         Command::Maps(args) => commands::maps::run(&args),
         Command::Config(args) => commands::config::run(&args),
         Command::Bench(args) => commands::bench::run(&args),
+        Command::Sc2(args) => commands::sc2::run(&args),
     };
     failure::report(outcome)
 }

@@ -31,7 +31,7 @@ const COMBINED: &[&str] = &[
 fn words(key: &str) -> &'static [&'static str] {
     match key {
         "env.map" => &["3m", "2s3z", "2m_vs_1z", "matrix-game"],
-        "env.scenario" => &[""],
+        "env.scenario" | "env.game_version" => &[""],
         "policy.partitions" => &["all", "round-robin", "sampled:1"],
         other => panic!("no values of {other} are known here"),
     }
@@ -55,6 +55,8 @@ fn value(key: &str, accepts: Accepts) -> BoxedStrategy<String> {
                 .prop_map(move |value: f64| format!("{:?}", value.clamp(least, greatest)))
                 .boxed()
         }
+        // The other engine is a game that may not be installed.
+        Accepts::OneOf(_) if key == "env.engine" => Just(quoted(&"simulator")).boxed(),
         Accepts::OneOf(words) => prop::sample::select(words)
             .prop_map(move |word| quoted(&word))
             .boxed(),

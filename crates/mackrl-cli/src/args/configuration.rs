@@ -30,6 +30,10 @@ pub(crate) struct ConfigurationArgs {
     #[arg(long, value_name = "MAP", help_heading = "Configuration")]
     pub(crate) map: Option<String>,
 
+    /// What plays the battles: simulator, or sc2 for StarCraft II on this machine (short for `--set env.engine=NAME`)
+    #[arg(long, value_name = "NAME", help_heading = "Configuration")]
+    pub(crate) env: Option<String>,
+
     /// What learns: mackrl or central-v (short for `--set policy.algorithm=NAME`)
     #[arg(long, value_name = "NAME", help_heading = "Configuration")]
     pub(crate) algorithm: Option<String>,
@@ -80,9 +84,10 @@ impl ConfigurationArgs {
         with_scenario(builder)
     }
 
-    fn short_flags(&self) -> [(&'static str, &'static str, Option<String>); 4] {
+    fn short_flags(&self) -> [(&'static str, &'static str, Option<String>); 5] {
         [
             ("--map", "env.map", self.map.clone()),
+            ("--env", "env.engine", self.env.clone()),
             ("--algorithm", "policy.algorithm", self.algorithm.clone()),
             (
                 "--steps",

@@ -5,6 +5,7 @@ mod configuration;
 mod play;
 mod replay;
 mod runs;
+mod sc2;
 
 use std::path::PathBuf;
 
@@ -18,9 +19,13 @@ pub(crate) use bench::{
     BenchArgs, BenchCommand, BenchEnvironmentArgs, BenchTrainArgs, BenchUpdateArgs,
 };
 pub(crate) use configuration::{ConfigurationArgs, read_scenario, with_scenario};
-pub(crate) use play::PlayArgs;
+pub(crate) use play::{PlayArgs, PolicyChoice};
 pub(crate) use replay::{ExplainArgs, ReplayArgs};
 pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, TrainArgs};
+pub(crate) use sc2::{
+    DoctorArgs, ExecGameArgs, InstallArgs, KillArgs, PsArgs, RecordArgs, Sc2Args, Sc2Command,
+    ServeArgs, UnitsChoice,
+};
 
 /// Teaches teams to coordinate without communicating, by acting jointly on what they commonly know.
 ///
@@ -51,6 +56,7 @@ pub(crate) enum Command {
     Maps(MapsArgs),
     Config(ConfigArgs),
     Bench(BenchArgs),
+    Sc2(Sc2Args),
 }
 
 /// Reproduce a figure of the paper, and judge what the paper says about it

@@ -26,6 +26,10 @@ pub(crate) struct PlayArgs {
     #[arg(long, value_name = "MAP", default_value = "3m")]
     pub(crate) map: String,
 
+    /// What plays the battles: simulator, or sc2 for StarCraft II on this machine, whose own replay --save-replay writes
+    #[arg(long, value_name = "NAME", default_value = "simulator")]
+    pub(crate) env: String,
+
     /// How the team plays
     #[arg(long, value_name = "NAME", value_enum, default_value = "focus-fire")]
     pub(crate) policy: PolicyChoice,

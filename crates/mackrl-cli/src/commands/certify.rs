@@ -9,15 +9,13 @@ use std::{
 use anyhow::Context;
 use mackrl::{
     decentralised::{AgentLink, Answer, Certificate, Request, Subject},
-    training::{
-        assembly::{self, World},
-        read_weights,
-    },
+    training::{assembly, read_weights},
 };
 use serde_json::Value;
 
 use crate::{
     args::CertifyArgs,
+    commands::sc2,
     failure::Failure,
     output::{self, Sourced},
     provenance::{Choice, Judgement, Provenance},
@@ -40,7 +38,7 @@ pub(crate) fn run(args: &CertifyArgs) -> anyhow::Result<()> {
 }
 
 fn certify(folder: &Path, run: &Run, args: &CertifyArgs) -> anyhow::Result<Certificate> {
-    let world = World::new(&run.config)?;
+    let world = sc2::world(&run.config)?;
     let policy = assembly::policy(&run.config, &world)?;
     let weights = policy.weights(&read_weights(policy.layout(), &run.weights)?);
     let mut links = (0..world.spec().agents)

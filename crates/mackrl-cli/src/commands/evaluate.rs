@@ -4,15 +4,17 @@ use std::path::Path;
 
 use anyhow::Context;
 use mackrl::{
+    config::Engine,
     policy::Behaviour,
     replay::record_policy,
-    training::{Evaluation, evaluate},
+    training::{Episodes, Evaluation, evaluate_in},
 };
 use mackrl_env::{EpisodeKey, Stream};
 use serde_json::Value;
 
 use crate::{
     args::EvaluateArgs,
+    commands::sc2,
     failure::Failure,
     output::{self, Sourced},
     provenance::{Choice, Judgement, Provenance},
@@ -33,7 +35,19 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
         );
         return Err(Failure::Usage { message }.into());
     }
-    let evaluation = evaluate(&run.config, &run.weights, episodes, seed, threads)
+    if args.save_replays > 0 && run.config.env.engine == Engine::Sc2 {
+        let message = "--save-replays plays episodes again in the simulator, but this run is one of StarCraft II";
+        return Err(Failure::Usage {
+            message: message.to_owned(),
+        }
+        .into());
+    }
+    let chosen = Episodes {
+        count: episodes,
+        seed,
+    };
+    let world = sc2::world(&run.config)?;
+    let evaluation = evaluate_in(&world, &run.config, &run.weights, chosen, threads)
         .with_context(|| format!("cannot evaluate {}", args.run.display()))?;
     save_replays(&args.run, &run, seed, args.save_replays)?;
     let judgement = Judgement {

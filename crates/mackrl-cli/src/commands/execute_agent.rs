@@ -19,7 +19,10 @@ pub(crate) fn run(args: &ExecuteAgentArgs) -> anyhow::Result<()> {
         Some(weights) => Run::open_with_weights(&args.run, weights)?,
         None => Run::open(&args.run)?,
     };
-    let world = World::new(&run.config)?;
+    // An agent needs to know its world; it does not play in it.
+    let mut config = run.config.clone();
+    config.env = config.env.simulated();
+    let world = World::new(&config)?;
     let agents = world.spec().agents;
     if args.agent >= agents {
         let message = format!("--agent is {}, expected less than {agents}", args.agent);

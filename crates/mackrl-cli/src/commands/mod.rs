@@ -11,4 +11,5 @@ pub(crate) mod play;
 pub(crate) mod replay;
 pub(crate) mod reproduce;
 pub(crate) mod resume;
+pub(crate) mod sc2;
 pub(crate) mod train;

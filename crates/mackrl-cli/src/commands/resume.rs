@@ -6,6 +6,7 @@ use mackrl::training::Trainer;
 
 use crate::{
     args::ResumeArgs,
+    commands::sc2,
     failure::printable,
     run_folder::{Resumption, RunFolder},
     signals::StopRequest,
@@ -36,9 +37,10 @@ pub(crate) fn run(args: &ResumeArgs) -> anyhow::Result<()> {
             printable(&damage)
         );
     }
+    let world = sc2::world(&config)?;
     let trainer = match checkpoint {
-        Some(checkpoint) => Trainer::resumed(&config, threads, &checkpoint)?,
-        None => Trainer::new(&config, threads)?,
+        Some(checkpoint) => Trainer::resumed(&config, &world, threads, &checkpoint)?,
+        None => Trainer::in_world(&config, &world, threads)?,
     };
     let mut training = Reporting::new(trainer, &config, &stop);
     let summary = training_loop::train_into(&mut folder, &mut training, &config, &stop)?;

@@ -6,6 +6,7 @@ use mackrl::{config::Config, training::Trainer};
 
 use crate::{
     args::TrainArgs,
+    commands::sc2,
     run_folder::RunFolder,
     signals::StopRequest,
     training_loop::{self, Reporting},
@@ -18,7 +19,11 @@ pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<()> {
     RunFolder::check_free(&path)?;
     let stop = StopRequest::listen()?;
     let threads = args.threads.count();
-    let mut training = Reporting::new(Trainer::new(&config, threads)?, &config, &stop);
+    let mut training = Reporting::new(
+        Trainer::in_world(&config, &sc2::world(&config)?, threads)?,
+        &config,
+        &stop,
+    );
     let mut folder = RunFolder::create(&path, &config, threads)?;
     let summary = training_loop::train_into(&mut folder, &mut training, &config, &stop)?;
     training_loop::print(&summary, args.json)

@@ -18,6 +18,17 @@ pub enum Algorithm {
     CentralV,
 }
 
+/// What plays the battles.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Engine {
+    /// The built-in simulator.
+    #[default]
+    Simulator,
+    /// StarCraft II itself, or a server that stands in for it.
+    Sc2,
+}
+
 /// How parameters follow the gradient.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     Error,
-    config::{ConfigError, Origin, Setting, settings::in_section},
+    config::{ConfigError, Engine, Origin, Setting, settings::in_section},
 };
 
 /// The world that is played in.
@@ -26,6 +26,10 @@ pub struct EnvironmentConfig {
     /// Text of a scenario that is played instead of a shipped map; empty for shipped maps. It is stored, not its file's name
     /// alone, so that a run folder holds all that its result depends on.
     pub scenario: String,
+    /// What plays the battles: the built-in simulator, or StarCraft II on this machine.
+    pub engine: Engine,
+    /// Version of StarCraft II, such as `4.10.0`; empty for the latest that is installed.
+    pub game_version: String,
     /// Settings of skirmishes, written beside the map: `env.move_amount`, `env.sight_range` and so on.
     #[serde(flatten)]
     pub settings: SkirmishSettings,
@@ -38,6 +42,8 @@ impl Default for EnvironmentConfig {
         Self {
             map: "3m".to_owned(),
             scenario: String::new(),
+            engine: Engine::Simulator,
+            game_version: String::new(),
             settings: SkirmishSettings::default(),
             matrix_game: MatrixGameSettings::default(),
         }
@@ -64,6 +70,19 @@ impl EnvironmentConfig {
                     pattern: None,
                 },
             },
+            Setting {
+                key: "env.engine".to_owned(),
+                meaning: "What plays the battles: the built-in simulator, or StarCraft II on this machine.",
+                accepts: Accepts::OneOf(&["simulator", "sc2"]),
+            },
+            Setting {
+                key: "env.game_version".to_owned(),
+                meaning: "Version of StarCraft II, such as 4.10.0; empty for the latest that is installed.",
+                accepts: Accepts::Text {
+                    expects: "a version of StarCraft II, or nothing",
+                    pattern: None,
+                },
+            },
         ];
         own.into_iter()
             .chain(in_section("env", SkirmishSettings::SETTINGS))
@@ -77,11 +96,24 @@ impl EnvironmentConfig {
         (self.scenario.is_empty() && self.map.ends_with(".toml")).then_some(self.map.as_str())
     }
 
-    /// Builds the world.
+    /// The same world, played by the built-in simulator: its sizes are those of the game's.
+    #[must_use]
+    pub fn simulated(&self) -> Self {
+        Self {
+            engine: Engine::Simulator,
+            ..self.clone()
+        }
+    }
+
+    /// Builds the world in the built-in simulator.
     ///
     /// # Errors
-    /// [`Error::Config`] if the map is unknown or a setting is out of its range.
+    /// [`Error::Config`] if the map is unknown, a setting is out of its range, or another engine is to play.
     pub fn make(&self) -> Result<Box<dyn Environment>, Error> {
+        if self.engine != Engine::Simulator {
+            let message = "env.engine is `sc2`, but only the built-in simulator can be used here";
+            return Err(Error::Config(message.to_owned()));
+        }
         if self.scenario.is_empty() && self.map == MATRIX_GAME {
             return registry::make_matrix_game(self.matrix_game)
                 .map(|game| Box::new(game) as _)

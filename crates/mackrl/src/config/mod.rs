@@ -27,7 +27,7 @@ mod sections;
 mod settings;
 
 pub use builder::ConfigBuilder;
-pub use choices::{Algorithm, OptimiserKind, PartitionChoice};
+pub use choices::{Algorithm, Engine, OptimiserKind, PartitionChoice};
 pub use environment::EnvironmentConfig;
 pub use error::{ConfigError, Origin};
 pub use presets::{Preset, presets};

@@ -199,9 +199,13 @@ impl Config {
         if self.policy.algorithm != Algorithm::Mackrl {
             return Ok(());
         }
-        let world = self.env.make().map_err(|error| ConfigError::Scenario {
-            message: error.to_string(),
-        })?;
+        let world = self
+            .env
+            .simulated()
+            .make()
+            .map_err(|error| ConfigError::Scenario {
+                message: error.to_string(),
+            })?;
         let agents = world.spec().agents;
         let Some(expected) = self.policy.partitions.expected_of(agents) else {
             return Ok(());

@@ -12,7 +12,7 @@
 
 use mackrl_env::{
     Action, AgentId, Draw, EntityId, EntitySet, Environment, EnvironmentSpec, EpisodeKey,
-    Observations, Stream,
+    Observations, StepError, Stream,
 };
 use serde::{Deserialize, Serialize};
 
@@ -153,13 +153,32 @@ impl Subject<'_, '_> {
         for behaviour in [sampled, Behaviour::GREEDY] {
             for episode in 0..episodes as u64 {
                 let key = EpisodeKey::new(self.seed, Stream::Evaluation, episode);
-                let recorded = self.compare_separate_agents(key, behaviour, &mut certificate)?;
+                let recorded = self.record(key, behaviour, &mut certificate)?;
                 self.compare_altered_worlds(key, behaviour, &recorded, &mut certificate)?;
                 done += 1;
                 progress(done, 2 * episodes);
             }
         }
         Ok(certificate)
+    }
+
+    /// Plays an episode, again from its beginning if the world fails under it; what was compared in vain does not count.
+    fn record(
+        &mut self,
+        key: EpisodeKey,
+        behaviour: Behaviour,
+        certificate: &mut Certificate,
+    ) -> Result<Recorded, Error> {
+        loop {
+            let mut attempt = certificate.clone();
+            match self.compare_separate_agents(key, behaviour, &mut attempt) {
+                Err(Error::Step(StepError::Interrupted(failure))) if failure.can_be_repeated => {}
+                outcome => {
+                    *certificate = attempt;
+                    return outcome;
+                }
+            }
+        }
     }
 
     /// Plays an episode centrally and by separate agents at once.

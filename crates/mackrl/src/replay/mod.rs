@@ -64,6 +64,8 @@ pub enum Player {
         /// How it chose.
         behaviour: Behaviour,
     },
+    /// Another program, through StarCraft II's API.
+    Client,
 }
 
 /// One step.
@@ -120,6 +122,7 @@ impl Player {
         let name = match self {
             Self::Script { policy } => serde_json::to_value(policy),
             Self::Policy { algorithm, .. } => serde_json::to_value(algorithm),
+            Self::Client => Ok("client".into()),
         };
         let name = name.ok().and_then(|name| name.as_str().map(str::to_owned));
         name.unwrap_or_default()

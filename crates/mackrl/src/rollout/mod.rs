@@ -114,6 +114,12 @@ impl Rollout {
         Ok(())
     }
 
+    /// Episodes so far that were played in vain because a world failed.
+    #[must_use]
+    pub fn discarded(&self) -> u64 {
+        self.shards.iter().map(Shard::discarded).sum()
+    }
+
     /// The latest episodes, shard by shard, with the actors that played them.
     pub fn batches(&mut self) -> impl Iterator<Item = &mut ShardBatch> {
         self.shards.iter_mut().map(Shard::batch)

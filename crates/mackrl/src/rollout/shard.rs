@@ -8,7 +8,7 @@ use std::{
     },
 };
 
-use mackrl_env::{Action, Environment, EpisodeKey, Observations};
+use mackrl_env::{Action, Environment, EpisodeKey, Observations, StepError};
 
 use super::{Episode, RolloutSettings};
 use crate::{
@@ -34,6 +34,8 @@ pub struct Shard {
     batch: ShardBatch,
     /// Whether to give up: episodes of large teams last seconds.
     stop: Arc<AtomicBool>,
+    /// Episodes that were played in vain.
+    discarded: u64,
 }
 
 impl Shard {
@@ -59,6 +61,7 @@ impl Shard {
                 actor,
             },
             stop: Arc::default(),
+            discarded: 0,
         }
     }
 
@@ -78,12 +81,38 @@ impl Shard {
         &mut self.batch
     }
 
+    /// Episodes so far that were played in vain because a world failed.
+    #[must_use]
+    pub const fn discarded(&self) -> u64 {
+        self.discarded
+    }
+
     /// Plays the episodes named `keys`, at most one per environment, to their ends.
     ///
+    /// If a world fails under one of them, all are played again from their beginnings: the actor holds what it computed for
+    /// all rows of a step together, and a failure is rare. Nothing of the failed attempt is kept.
+    ///
     /// # Errors
-    /// If an environment refuses an action, which means that the policy's masks disagree with it, or if something that an
-    /// environment or a controller gives is not finite; [`Error::Stopped`] if asked to stop.
+    /// If an environment refuses an action, which means that the policy's masks disagree with it, or cannot be played in any
+    /// more, or if something that an environment or a controller gives is not finite; [`Error::Stopped`] if asked to
+    /// stop.
     pub fn play(
+        &mut self,
+        weights: &Weights,
+        keys: &[EpisodeKey],
+        settings: RolloutSettings,
+    ) -> Result<(), Error> {
+        loop {
+            match self.attempt(weights, keys, settings) {
+                Err(Error::Step(StepError::Interrupted(failure))) if failure.can_be_repeated => {
+                    self.discarded += keys.len() as u64;
+                }
+                outcome => return outcome,
+            }
+        }
+    }
+
+    fn attempt(
         &mut self,
         weights: &Weights,
         keys: &[EpisodeKey],

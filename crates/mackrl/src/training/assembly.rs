@@ -1,6 +1,6 @@
 //! From a configuration to the objects that it describes.
 
-use std::sync::Arc;
+use std::{fmt::Debug, sync::Arc};
 
 use mackrl_env::{Environment, EnvironmentSpec, PriorKnowledge};
 
@@ -15,27 +15,76 @@ use crate::{
     nn::OptimiserKind,
 };
 
+/// Where the worlds of a run come from: the built-in simulator, or something outside this library that can fail.
+pub trait WorldSource: Send + Sync + Debug {
+    /// Builds the world that `config` describes.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if it cannot be built.
+    fn make(&self, config: &EnvironmentConfig) -> Result<Box<dyn Environment>, Error>;
+
+    /// Worlds that may be played in at once, if that is limited.
+    fn parallel_max(&self) -> Option<usize>;
+
+    /// What the worlds have gone through so far, by names below `sys/` that [`super::METRICS`] explains.
+    fn counts(&self) -> Vec<(&'static str, u64)>;
+}
+
+/// The built-in simulator, which never fails and has no limits.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Simulator;
+
+impl WorldSource for Simulator {
+    fn make(&self, config: &EnvironmentConfig) -> Result<Box<dyn Environment>, Error> {
+        config.make()
+    }
+
+    fn parallel_max(&self) -> Option<usize> {
+        None
+    }
+
+    fn counts(&self) -> Vec<(&'static str, u64)> {
+        Vec::new()
+    }
+}
+
 /// Builds worlds of the kind that a configuration names.
 #[derive(Debug, Clone)]
 pub struct World {
+    source: Arc<dyn WorldSource>,
     config: EnvironmentConfig,
     spec: EnvironmentSpec,
     prior: Arc<dyn PriorKnowledge>,
 }
 
 impl World {
-    /// Reads the configuration's `env` section.
+    /// Reads the configuration's `env` section, for worlds in the built-in simulator.
     ///
     /// # Errors
     /// [`Error::Config`] if there is no such map or the world refuses a setting.
     pub fn new(config: &Config) -> Result<Self, Error> {
-        let environment = config.env.make()?;
+        Self::from_source(config, Arc::new(Simulator))
+    }
+
+    /// Reads the configuration's `env` section, for worlds that `source` makes.
+    ///
+    /// # Errors
+    /// [`Error::Config`] as [`WorldSource::make`].
+    pub fn from_source(config: &Config, source: Arc<dyn WorldSource>) -> Result<Self, Error> {
+        let environment = source.make(&config.env)?;
         let (spec, prior) = (environment.spec().clone(), environment.prior_knowledge());
         Ok(Self {
+            source,
             config: config.env.clone(),
             spec,
             prior,
         })
+    }
+
+    /// Where the worlds come from.
+    #[must_use]
+    pub fn source(&self) -> &dyn WorldSource {
+        &*self.source
     }
 
     /// Sizes and limits.
@@ -55,7 +104,7 @@ impl World {
     /// # Errors
     /// [`Error::Config`] as [`World::new`].
     pub fn environments(&self, count: usize) -> Result<Vec<Box<dyn Environment>>, Error> {
-        (0..count).map(|_| self.config.make()).collect()
+        (0..count).map(|_| self.source.make(&self.config)).collect()
     }
 }
 
@@ -94,9 +143,11 @@ pub fn tensors_bytes_max(config: &Config) -> Result<usize, Error> {
     const HEADER: usize = 1 << 20;
     /// Parameters, a target copy and two moments.
     const COPIES: usize = 4;
-    let world = World::new(config)?;
+    let mut config = config.clone();
+    config.env = config.env.simulated();
+    let world = World::new(&config)?;
     let critic = config.policy.hidden * (world.spec().state_size + 8);
-    let parameters = policy(config, &world)?.layout().len() + critic;
+    let parameters = policy(&config, &world)?.layout().len() + critic;
     Ok(HEADER + COPIES * parameters * size_of::<f32>())
 }
 

@@ -60,13 +60,44 @@ pub fn evaluate(
     seed: u64,
     threads: usize,
 ) -> Result<Evaluation, Error> {
-    let world = assembly::World::new(config)?;
-    let policy = assembly::policy(config, &world)?;
+    evaluate_in(
+        &assembly::World::new(config)?,
+        config,
+        weights,
+        Episodes {
+            count: episodes,
+            seed,
+        },
+        threads,
+    )
+}
+
+/// Which episodes are played.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Episodes {
+    /// How many.
+    pub count: usize,
+    /// The seed that names them.
+    pub seed: u64,
+}
+
+/// As [`evaluate`], in a world that need not be the built-in simulator's.
+///
+/// # Errors
+/// As [`evaluate`], and [`Error::Step`] if the world cannot be played in any more.
+pub fn evaluate_in(
+    world: &assembly::World,
+    config: &Config,
+    weights: &[u8],
+    episodes: Episodes,
+    threads: usize,
+) -> Result<Evaluation, Error> {
+    let policy = assembly::policy(config, world)?;
     let parameters = read_weights(policy.layout(), weights)?;
-    let mut evaluator = Evaluator::new(&*policy, &world, episodes, threads)?;
+    let mut evaluator = Evaluator::new(&*policy, world, episodes.count, threads)?;
     let weights = policy.weights(&parameters);
-    evaluator.play(&weights, episodes, |episode| {
-        EpisodeKey::new(seed, Stream::Evaluation, episode)
+    evaluator.play(&weights, episodes.count, |episode| {
+        EpisodeKey::new(episodes.seed, Stream::Evaluation, episode)
     })
 }
 
@@ -84,7 +115,8 @@ impl Evaluator {
         episodes: usize,
         threads: usize,
     ) -> Result<Self, Error> {
-        let environments = world.environments(episodes.clamp(1, PARALLEL_EPISODES))?;
+        let parallel_max = world.source().parallel_max().unwrap_or(PARALLEL_EPISODES);
+        let environments = world.environments(episodes.clamp(1, parallel_max.max(1)))?;
         Ok(Self {
             rollout: Rollout::new(policy, environments, SHARD_SIZE, threads),
         })
@@ -93,6 +125,11 @@ impl Evaluator {
     /// Gives up playing as soon as `stop` is set.
     pub(super) fn stop_when(&mut self, stop: &Arc<AtomicBool>) {
         self.rollout.stop_when(stop);
+    }
+
+    /// Episodes that were played in vain because a world failed.
+    pub(super) fn discarded(&self) -> u64 {
+        self.rollout.discarded()
     }
 
     /// What the latest episodes were played with.

@@ -112,6 +112,32 @@ pub const METRICS: &[(&str, &str)] = &[
         "as `mackrl/delegation_rate_ck_enemies_`, in greedy test episodes",
     ),
     (
+        "sys/episodes_discarded",
+        "episodes so far that were played in vain because a game failed under them or beside them; nothing of them is learnt or counted",
+    ),
+    ("sys/game_launches", "processes of the game started so far"),
+    (
+        "sys/game_faults_launch",
+        "games so far that did not start or did not listen",
+    ),
+    (
+        "sys/game_faults_version",
+        "games so far that were not the version that was asked for",
+    ),
+    (
+        "sys/game_faults_late",
+        "games so far that did not answer in time",
+    ),
+    ("sys/game_faults_closed", "games so far that went away"),
+    (
+        "sys/game_faults_garbage",
+        "games so far whose answer made no sense",
+    ),
+    (
+        "sys/game_faults_refused",
+        "games so far that refused what was asked",
+    ),
+    (
         "sys/sps",
         "environment steps per second of training since the last row, tests included",
     ),
@@ -168,7 +194,10 @@ impl Serialize for MetricRow {
 
 /// Whether a number counts things.
 fn is_count(name: &str) -> bool {
-    matches!(name, "t_env" | "episode" | "update")
+    matches!(
+        name,
+        "t_env" | "episode" | "update" | "sys/episodes_discarded"
+    ) || name.starts_with("sys/game_")
 }
 
 #[expect(

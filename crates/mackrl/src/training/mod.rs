@@ -13,7 +13,7 @@ mod trainer;
 mod weights;
 
 pub use checkpoint::Checkpoint;
-pub use evaluation::{Evaluation, evaluate};
+pub use evaluation::{Episodes, Evaluation, evaluate, evaluate_in};
 pub use examination::{Examination, Part, TensorStatistics};
 pub use metrics::{METRICS, MetricRow};
 pub use trainer::Trainer;

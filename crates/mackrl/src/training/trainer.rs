@@ -28,6 +28,7 @@ const SHARD_SIZE: usize = 4;
 /// Trains one team.
 pub struct Trainer {
     config: Config,
+    world: assembly::World,
     pub(super) policy: Box<dyn Decentralised>,
     pub(super) learner: Learner,
     pub(super) rollout: Rollout,
@@ -57,15 +58,27 @@ impl Trainer {
     /// # Errors
     /// [`Error::Config`] if the configuration describes nothing that can be trained.
     pub fn new(config: &Config, threads: usize) -> Result<Self, Error> {
-        let world = assembly::World::new(config)?;
-        let policy = assembly::policy(config, &world)?;
+        Self::in_world(config, &assembly::World::new(config)?, threads)
+    }
+
+    /// As [`Trainer::new`], in a world that need not be the built-in simulator's.
+    ///
+    /// # Errors
+    /// As [`Trainer::new`].
+    pub fn in_world(
+        config: &Config,
+        world: &assembly::World,
+        threads: usize,
+    ) -> Result<Self, Error> {
+        let policy = assembly::policy(config, world)?;
         let environments = world.environments(config.learner.environments)?;
         let sizes = [world.spec().agents, world.spec().state_size];
         let settings = assembly::learner(config);
         Ok(Self {
             learner: Learner::new(&*policy, sizes, settings, config.run.seed, threads),
             rollout: Rollout::new(&*policy, environments, SHARD_SIZE, threads),
-            evaluator: Evaluator::new(&*policy, &world, config.test.episodes, threads)?,
+            evaluator: Evaluator::new(&*policy, world, config.test.episodes, threads)?,
+            world: world.clone(),
             policy,
             config: config.clone(),
             steps_env: 0,
@@ -78,20 +91,20 @@ impl Trainer {
         })
     }
 
-    /// As [`Self::new`], continued where `checkpoint` was taken; see [`Self::restore`]. Nothing large is made before it is known
-    /// that the checkpoint holds a policy of the configured size, because both may be a stranger's.
+    /// As [`Self::in_world`], continued where `checkpoint` was taken; see [`Self::restore`]. Nothing large is made before it is
+    /// known that the checkpoint holds a policy of the configured size, because both may be a stranger's.
     ///
     /// # Errors
-    /// As [`Self::new`] and [`Self::restore`].
+    /// As [`Self::in_world`] and [`Self::restore`].
     pub fn resumed(
         config: &Config,
+        world: &assembly::World,
         threads: usize,
         checkpoint: &Checkpoint,
     ) -> Result<Self, Error> {
-        let world = assembly::World::new(config)?;
-        let policy = assembly::policy(config, &world)?;
+        let policy = assembly::policy(config, world)?;
         read_weights(policy.layout(), &checkpoint.tensors)?;
-        let mut trainer = Self::new(config, threads)?;
+        let mut trainer = Self::in_world(config, world, threads)?;
         trainer.restore(checkpoint)?;
         Ok(trainer)
     }
@@ -120,8 +133,8 @@ impl Trainer {
     ///
     /// # Errors
     /// [`Error::NotFinite`] if a number is not finite: one that an environment gives, a logit, a number of the critic's, a
-    /// gradient, a moment or a parameter after the step. [`Error::Stopped`] if asked to stop. The trainer is as it was before then,
-    /// and can make the same update again.
+    /// gradient, a moment or a parameter after the step. [`Error::Step`] if a world cannot be played in any more,
+    /// [`Error::Stopped`] if asked to stop. The trainer is as it was before then, and can make the same update again.
     pub fn update(&mut self) -> Result<Option<MetricRow>, Error> {
         if self.is_test_due() {
             return self.test().map(Some);
@@ -319,6 +332,13 @@ impl Trainer {
                 "sys/sps",
                 played / interval.began.elapsed().as_secs_f64().max(1e-9),
             );
+        }
+        let discarded = self.rollout.discarded() + self.evaluator.discarded();
+        if discarded > 0 {
+            row.push("sys/episodes_discarded", discarded as f64);
+        }
+        for (name, count) in self.world.source().counts() {
+            row.push(name, count as f64);
         }
         row
     }

@@ -4,13 +4,14 @@ mod statistics;
 
 use anyhow::Context;
 use mackrl::{
-    config::{ConfigBuilder, EnvironmentConfig},
+    config::{ConfigBuilder, Engine, EnvironmentConfig},
     replay::record_script,
 };
 use mackrl_env::{EpisodeKey, Stream, registry};
 
 use crate::{
     args::{PlayArgs, with_scenario},
+    commands::sc2,
     failure::Failure,
     output,
     replay::{Opened, Summary},
@@ -35,6 +36,9 @@ pub(crate) fn run(args: &PlayArgs) -> anyhow::Result<()> {
         .into());
     };
     let key = EpisodeKey::new(args.seed, Stream::Other, 0);
+    if map.engine == Engine::Sc2 {
+        return sc2::play_one(args, map, *policy, key);
+    }
     let replay = record_script(map, *policy, key)?;
     output::write_file(file, &replay.to_bytes())?;
     let summary = Summary::of(&Opened::of(replay)?);
@@ -58,6 +62,8 @@ fn map(args: &PlayArgs, name: &str) -> anyhow::Result<EnvironmentConfig> {
     let quoted = serde_json::to_string(name).context("a name is a string")?;
     let typed = format!("--map {name}");
     let mut builder = ConfigBuilder::new().flag(&typed, &format!("env.map={quoted}"))?;
+    let typed = format!("--env {}", args.env);
+    builder = builder.flag(&typed, &format!("env.engine={}", args.env))?;
     for assignment in &args.set {
         builder = builder.set(assignment)?;
     }

@@ -5,14 +5,14 @@ use std::sync::{
     atomic::{AtomicUsize, Ordering},
 };
 
-use mackrl::config::EnvironmentConfig;
+use mackrl::{config::EnvironmentConfig, training::assembly::WorldSource};
 use mackrl_env::{
-    Action, Environment, EpisodeKey, Observations, Stream,
+    Action, Environment, EpisodeKey, Observations, StepError, Stream,
     skirmish::scripted::{ScriptedPolicy, ScriptedTeam},
 };
 use serde::Serialize;
 
-use crate::output;
+use crate::{commands::sc2, output};
 
 /// Episodes that a thread takes at once.
 const PORTION: usize = 16;
@@ -50,9 +50,10 @@ pub(super) fn play_many(
     let portions = episodes.div_ceil(PORTION);
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let finished = Mutex::new(Vec::new());
+    let worlds = sc2::worlds(map);
     std::thread::scope(|scope| {
         let work = || -> anyhow::Result<()> {
-            let mut player = Player::new(map, policy)?;
+            let mut player = Player::new(map, policy, &*worlds)?;
             loop {
                 let portion = next.fetch_add(1, Ordering::Relaxed);
                 if portion >= portions {
@@ -86,39 +87,56 @@ pub(super) fn play_many(
 
 /// One thread's world and team.
 struct Player {
-    skirmish: mackrl_env::skirmish::Skirmish,
+    environment: Box<dyn Environment>,
     team: ScriptedTeam,
     observations: Observations,
     actions: Vec<Action>,
 }
 
 impl Player {
-    fn new(map: &EnvironmentConfig, policy: ScriptedPolicy) -> anyhow::Result<Self> {
-        let skirmish = map.skirmish()?;
+    fn new(
+        map: &EnvironmentConfig,
+        policy: ScriptedPolicy,
+        worlds: &dyn WorldSource,
+    ) -> anyhow::Result<Self> {
+        let environment = worlds.make(map)?;
+        // Scripts know a map by its skirmish, whoever plays it.
+        let team = ScriptedTeam::new(policy, &map.simulated().skirmish()?);
         Ok(Self {
-            team: ScriptedTeam::new(policy, &skirmish),
-            observations: Observations::new(skirmish.spec(), 1),
-            actions: vec![Action::default(); skirmish.spec().agents],
-            skirmish,
+            team,
+            observations: Observations::new(environment.spec(), 1),
+            actions: vec![Action::default(); environment.spec().agents],
+            environment,
         })
     }
 
+    /// Plays an episode, again from its beginning if the world fails under it.
     fn play(&mut self, key: EpisodeKey) -> anyhow::Result<Outcome> {
-        self.skirmish.reset(key, &mut self.observations.row_mut(0));
+        loop {
+            match self.attempt(key) {
+                Err(StepError::Interrupted(failure)) if failure.can_be_repeated => {}
+                outcome => return Ok(outcome?),
+            }
+        }
+    }
+
+    fn attempt(&mut self, key: EpisodeKey) -> Result<Outcome, StepError> {
+        self.environment
+            .reset(key, &mut self.observations.row_mut(0));
         let mut total = 0.0;
         let mut step = 0;
         loop {
             self.team
                 .act(&self.observations, 0, (key, step), &mut self.actions);
             let row = &mut self.observations.row_mut(0);
-            let time_step = self.skirmish.step(&self.actions, row)?;
+            let time_step = self.environment.step(&self.actions, row)?;
             total += f64::from(time_step.reward);
             step += 1;
             if time_step.end.is_some() {
                 break;
             }
         }
-        let statistics = self.skirmish.statistics();
+        let statistics = self.environment.statistics();
         Ok([
             f64::from(u8::from(statistics.battle_won)),
             total,

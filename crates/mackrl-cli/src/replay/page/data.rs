@@ -137,7 +137,7 @@ impl PageData {
 fn player(opened: &Opened) -> String {
     let name = opened.replay.player.name();
     match opened.replay.player {
-        Player::Script { .. } => name,
+        Player::Script { .. } | Player::Client => name,
         Player::Policy { behaviour, .. } => match behaviour.mode {
             Mode::Greedy => format!("{name}, greedy"),
             Mode::Sampled => format!("{name}, sampled"),

@@ -144,9 +144,8 @@ impl Face {
     /// If `actions` does not hold one action per agent.
     pub fn check(&self, state: &BattleState, actions: &[Action]) -> Result<(), IllegalAction> {
         assert_eq!(actions.len(), self.layout.agents, "one action per agent");
-        let scene = self.scene(state);
         let is_illegal =
-            |(agent, action): &(usize, &Action)| !scene.is_available(*agent, action.index());
+            |(agent, action): &(usize, &Action)| !self.is_available(state, *agent, **action);
         match actions.iter().enumerate().find(is_illegal) {
             None => Ok(()),
             Some((agent, action)) => Err(IllegalAction {
@@ -154,6 +153,12 @@ impl Face {
                 action: *action,
             }),
         }
+    }
+
+    /// Whether `action` is available to `agent` in `state`.
+    #[must_use]
+    pub fn is_available(&self, state: &BattleState, agent: usize, action: Action) -> bool {
+        self.scene(state).is_available(agent, action.index())
     }
 
     /// The order by which `agent` does an available `action` in `state`; none if it rests because it is dead.
