@@ -8,7 +8,7 @@ use mackrl_env::{
 };
 use mackrl_sc2::adapter::StarCraft2;
 
-use super::worlds::{StarCraftWorlds, simulated};
+use super::worlds::StarCraftWorlds;
 use crate::{args::PlayArgs, output};
 
 /// Plays one episode, writes the game's replay, and says how it went.
