@@ -39,6 +39,21 @@ pub(crate) fn read(path: &Path, length_max: usize) -> anyhow::Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// The text of a file of at most `length_max` bytes.
+///
+/// # Errors
+/// As [`read`], and [`Failure::BadData`] if it is not UTF-8.
+pub(crate) fn read_text(path: &Path, length_max: usize) -> anyhow::Result<String> {
+    String::from_utf8(read(path, length_max)?).map_err(|error| {
+        let message = format!(
+            "{}: not UTF-8 text at byte {}",
+            path.display(),
+            error.utf8_error().valid_up_to()
+        );
+        Failure::BadData { message }.into()
+    })
+}
+
 /// What is no regular file.
 fn in_words(kind: FileType) -> &'static str {
     if kind.is_dir() {

@@ -197,11 +197,25 @@ pub(crate) fn report(outcome: anyhow::Result<()>) -> ExitCode {
 
 /// The chain of causes on one line, and the remedy on another if one is known.
 fn explain(error: &anyhow::Error) -> String {
-    let mut text = format!("error: {error:#}\n");
+    let mut text = format!("error: {}\n", printable(&format!("{error:#}")));
     if let Some(hint) = hint(error) {
         text.push_str(&format!("hint: {hint}\n"));
     }
     text
+}
+
+/// What may be shown of a text that quotes a stranger's file: one line, not endless, and nothing that controls a terminal.
+pub(crate) fn printable(text: &str) -> String {
+    const LENGTH_MAX: usize = 1000;
+    let mut characters = text.chars();
+    let shown = characters.by_ref().take(LENGTH_MAX);
+    let mut shown: String = shown
+        .map(|c| if c.is_control() { ' ' } else { c })
+        .collect();
+    if characters.next().is_some() {
+        shown.push('…');
+    }
+    shown
 }
 
 fn exit(error: &anyhow::Error) -> Exit {
@@ -299,6 +313,12 @@ fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
     if let Some(mackrl::Error::Step(StepError::Interrupted(_))) = cause.downcast_ref() {
         return Some("`mackrl sc2 doctor --start` looks for the cause".to_owned());
     }
+    if let Some(error) = cause.downcast_ref::<io::Error>() {
+        use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+        return matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge).then(|| {
+            "make room; a run that was being trained goes on with `mackrl resume DIR`".to_owned()
+        });
+    }
     match cause.downcast_ref::<ConfigError>()? {
         ConfigError::UnknownMap { .. } => Some(
             "`mackrl maps` lists every map; the name of a scenario file ends in .toml".to_owned(),
@@ -306,13 +326,13 @@ fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
         ConfigError::Scenario { .. } => Some(
             "examples/scenarios/sniper-alley.toml explains every line of a scenario".to_owned(),
         ),
-        ConfigError::UnknownKey { .. } => {
-            Some("`mackrl config --print` lists every setting".to_owned())
-        }
+        ConfigError::UnknownKey { .. } => Some(
+            "`mackrl config --print` lists every setting, `mackrl config --explain KEY` explains one".to_owned(),
+        ),
         ConfigError::WrongValue { key, .. } => {
             let settings = Config::settings();
-            let setting = settings.iter().find(|setting| setting.key == key)?;
-            Some(format!("{key}: {}", setting.meaning()))
+            let setting = settings.iter().find(|setting| setting.key == *key)?;
+            Some(format!("{key}: {}", setting.meaning))
         }
         ConfigError::Syntax { .. } => {
             Some("settings are written as TOML, such as learner.gamma = 0.95".to_owned())
@@ -368,6 +388,12 @@ mod tests {
     }
 
     #[test]
+    fn what_is_quoted_controls_no_terminal_and_has_an_end() {
+        assert_eq!(printable("a\u{1b}[2J\nb"), "a [2J b");
+        assert_eq!(printable(&"é".repeat(5000)).chars().count(), 1001);
+    }
+
+    #[test]
     fn the_chain_of_causes_is_told_once_with_the_remedy() {
         let error = Err::<(), _>(ConfigBuilder::new().set("gama=1").unwrap_err())
             .context("cannot configure")
@@ -375,7 +401,7 @@ mod tests {
         assert_eq!(
             explain(&error),
             "error: cannot configure: --set gama=1: unknown key `gama`, did you mean `learner.gamma`?\n\
-             hint: `mackrl config --print` lists every setting\n"
+             hint: `mackrl config --print` lists every setting, `mackrl config --explain KEY` explains one\n"
         );
     }
 }

@@ -69,6 +69,11 @@ impl StopRequest {
         });
     }
 
+    /// What is set as soon as a signal has arrived.
+    pub(crate) const fn flag(&self) -> &Arc<AtomicBool> {
+        &self.0
+    }
+
     /// Asks to stop, as a signal would.
     pub(crate) fn make(&self) {
         self.0.store(true, Ordering::Relaxed);

@@ -51,8 +51,9 @@ pub(crate) struct Reporting {
 }
 
 impl Reporting {
-    /// A trainer of the run that `config` describes, at its beginning or restored.
-    pub(crate) fn new(trainer: Trainer, config: &Config) -> Self {
+    /// A trainer of the run that `config` describes, at its beginning or restored, that gives up when asked to stop.
+    pub(crate) fn new(mut trainer: Trainer, config: &Config, stop: &StopRequest) -> Self {
+        trainer.stop_when(stop.flag());
         let standing = Standing {
             steps_env: trainer.steps_env(),
             steps_env_total: config.run.steps_env,
@@ -169,6 +170,9 @@ fn train(
 ) -> anyhow::Result<Summary> {
     let start = Instant::now();
     let steps_env_before = training.standing().steps_env;
+    if config.run.tensorboard {
+        folder.write_events(steps_env_before)?;
+    }
     let interval = config.run.checkpoint_interval_steps_env;
     let mut intervals = steps_env_before / interval;
     while !training.finished() {
@@ -180,11 +184,14 @@ fn train(
             }
             .into());
         }
-        let updated = training.update();
-        let Update { metrics, standing } = updated.map_err(|error| match error {
-            mackrl::Error::NotFinite(number) => refuse(folder, training, config, *number),
-            other => other.into(),
-        })?;
+        let Update { metrics, standing } = match training.update() {
+            // What was begun was given up; the checkpoint is that of the moment before.
+            Err(mackrl::Error::Stopped) => continue,
+            Err(mackrl::Error::NotFinite(number)) => {
+                return Err(refuse(folder, training, config, *number));
+            }
+            outcome => outcome?,
+        };
         if let Some(metrics) = metrics {
             folder.append_metrics(&metrics)?;
             progress.hear(&metrics);

@@ -1,11 +1,15 @@
-//! Killing a run at any instant costs nothing that was written.
+//! Killing a run at any instant, and a disk that takes no more, cost nothing that was written.
 //!
-//! `MACKRL_KILLS=5000 cargo test --release -p mackrl-cli --test crash` kills more often.
+//! `MACKRL_KILLS=5000 cargo test --release -p mackrl-cli --test crash -- --nocapture` kills more often.
 #![cfg(unix)]
 
 mod support;
 
-use std::{path::Path, process::Command, time::Duration};
+use std::{
+    path::Path,
+    process::{Command, Stdio},
+    time::Duration,
+};
 
 use support::{
     exits, has_unfinished_checkpoint, outcome, resume, train, uninterrupted, wait_until,
@@ -49,7 +53,7 @@ fn a_run_that_is_killed_again_and_again_ends_with_the_same_bytes() {
         text.parse().expect("MACKRL_KILLS is a number of kills")
     });
     let expected = uninterrupted();
-    let (mut killed, mut while_writing, mut number) = (0, 0, 0);
+    let (mut killed, mut while_writing, mut number, mut runs) = (0, 0, 0, 0);
     while killed < kills {
         let parent = tempfile::tempdir().expect("a folder for the run");
         let run = parent.path().join("run");
@@ -60,11 +64,56 @@ fn a_run_that_is_killed_again_and_again_ends_with_the_same_bytes() {
             while_writing += usize::from(has_unfinished_checkpoint(&run));
         }
         exits(next(&run, number), 0);
+        runs += 1;
         assert!(outcome(&run) == expected, "after {killed} kills");
         assert!(!has_unfinished_checkpoint(&run), "leftovers are removed");
     }
+    println!("{killed} kills, {while_writing} of them met a checkpoint being written; {runs} runs");
     assert!(
         while_writing >= kills / 8,
         "only {while_writing} of {killed} kills met a checkpoint being written"
     );
+}
+
+/// The command, where no file can grow beyond so many blocks of 512 bytes: the last write is cut short, as on a full disk.
+fn limited(command: &Command, blocks: u32) -> Command {
+    let mut limited = Command::new("sh");
+    limited
+        .arg("-c")
+        .arg(format!(
+            "trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\""
+        ))
+        .arg(command.get_program())
+        .args(command.get_args())
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped());
+    limited
+}
+
+#[test]
+fn a_disk_that_takes_no_more_stops_the_run_and_loses_nothing() {
+    // Rows of metrics outgrow checkpoints.
+    let settings = ["policy.hidden=2", "run.metrics_interval_steps_env=1"];
+    let parent = tempfile::tempdir().expect("a folder for the runs");
+    let undisturbed = parent.path().join("undisturbed");
+    exits(train(&undisturbed, &settings), 0);
+    let expected = outcome(&undisturbed);
+    // No room for the first checkpoint; for some rows of metrics; for most.
+    for (blocks, at) in [
+        (20, "tensors.safetensors"),
+        (50, "metrics.jsonl"),
+        (80, "metrics.jsonl"),
+    ] {
+        let run = parent.path().join(format!("limited-{blocks}"));
+        let stderr = exits(limited(&train(&run, &settings), blocks), 74);
+        let told = stderr
+            .lines()
+            .find(|line| line.starts_with("error: cannot write "));
+        let told = told.unwrap_or_else(|| panic!("{stderr}"));
+        assert!(told.contains(at) && told.contains(" bytes)"), "{told}");
+        assert!(stderr.contains("hint: make room"), "{stderr}");
+        exits(resume(&run, 2), 0);
+        assert!(outcome(&run) == expected, "{blocks} blocks");
+    }
 }

@@ -74,11 +74,39 @@ fn a_second_interrupt_stops_at_once() {
     // After the first test come updates, each of which lasts longer than this test waits.
     assert!(wait_until(&mut child, || fs::metadata(&metrics)
         .is_ok_and(|metadata| metadata.len() > 0)));
-    send("INT", &child);
-    std::thread::sleep(Duration::from_millis(50));
-    send("INT", &child);
+    // The first asks; writing a checkpoint takes longer than the next ones need to arrive.
+    while child.try_wait().expect("a child can be asked").is_none() {
+        send("INT", &child);
+        std::thread::sleep(Duration::from_millis(2));
+    }
     let output = child.wait_with_output().expect("a child ends");
     told(&output, 130);
+}
+
+#[test]
+fn a_run_of_a_large_team_stops_in_time_and_goes_on() {
+    let parent = tempfile::tempdir().expect("a folder for the run");
+    let run = parent.path().join("run");
+    let large = ["env.map=27m_vs_30m", "policy.partitions=round-robin"];
+    let settings: Vec<&str> = SLOW.iter().copied().chain(large).collect();
+    // Neither its first test nor its first batch is anywhere near its end.
+    for mut command in [train(&run, &settings), resume(&run, 2)] {
+        let mut child = command.spawn().expect("the program starts");
+        let record = run.join("run.json");
+        let begun = || fs::read_to_string(&record).is_ok_and(|text| text.contains("running"));
+        assert!(wait_until(&mut child, begun), "the run ended before TERM");
+        std::thread::sleep(Duration::from_millis(700));
+        send("TERM", &child);
+        let asked = Instant::now();
+        told(&child.wait_with_output().expect("a child ends"), 75);
+        assert!(
+            asked.elapsed() < Duration::from_secs(5),
+            "{:?}",
+            asked.elapsed()
+        );
+        assert!(!has_unfinished_checkpoint(&run), "a checkpoint was written");
+        assert_eq!(checkpoints(&run).len(), 1);
+    }
 }
 
 #[test]
@@ -144,6 +172,31 @@ fn a_damaged_checkpoint_is_noticed_and_an_earlier_one_used() {
         "{stderr}"
     );
     assert!(outcome(&run) == expected);
+}
+
+#[test]
+fn a_run_that_goes_on_has_an_event_file_for_each_process() {
+    let parent = tempfile::tempdir().expect("a folder for the run");
+    let run = parent.path().join("run");
+    stop(train(&run, &["run.tensorboard=true"]), &run, "TERM", 2);
+    exits(resume(&run, 1), 0);
+    let names = fs::read_dir(&run).expect("a run folder").flatten();
+    let events: Vec<_> = names
+        .filter(|entry| {
+            entry
+                .file_name()
+                .to_string_lossy()
+                .starts_with("events.out.tfevents.")
+        })
+        .map(|entry| fs::read(entry.path()).expect("an event file"))
+        .collect();
+    assert_eq!(events.len(), 2);
+    let name = b"test_battle_won_mean";
+    let told = |events: &Vec<u8>| events.windows(name.len()).any(|part| part == name);
+    assert!(events.iter().all(told), "both processes tested");
+    let undisturbed = parent.path().join("undisturbed");
+    exits(train(&undisturbed, &["run.tensorboard=true"]), 0);
+    assert!(outcome(&run) == outcome(&undisturbed));
 }
 
 #[test]

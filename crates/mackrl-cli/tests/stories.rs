@@ -98,7 +98,7 @@ fn an_unknown_flag_is_a_usage_error() {
 fn an_unknown_setting_names_its_neighbour() {
     insta::assert_snapshot!(type_in("config --set learner.gama=0.9").fails(64), @r"
     error: --set learner.gama=0.9: unknown key `learner.gama`, did you mean `learner.gamma`?
-    hint: `mackrl config --print` lists every setting
+    hint: `mackrl config --print` lists every setting, `mackrl config --explain KEY` explains one
     ");
 }
 
@@ -155,6 +155,49 @@ fn the_printed_configuration_can_be_read_back() {
     };
     assert_eq!(values(&printed), values(&again));
     assert!(again.contains("seed = 7"), "{again}");
+}
+
+#[test]
+fn a_setting_is_explained_with_its_value_everywhere() {
+    insta::assert_snapshot!(type_in("config --explain learner.lambda --set learner.lambda=0.5").succeeds(), @r#"
+    learner.lambda
+      λ of the critic's TD(λ) targets: 0 looks one step ahead, 1 to the end of the episode.
+      takes              a number in [0, 1]
+      built-in           0.8
+      preset default     0.8  of the critic's TD(lambda) targets
+      preset paper       0.8  "TD-lambda of 0.8"
+      preset paper-code  0.8
+      here               0.5  --set learner.lambda=0.5
+    "#);
+    let section = type_in("config --explain test --json").succeeds();
+    let section: Vec<serde_json::Value> = serde_json::from_str(&section).expect("a JSON array");
+    let keys: Vec<_> = section.iter().map(|setting| &setting["key"]).collect();
+    assert_eq!(keys, ["test.interval_steps_env", "test.episodes"]);
+    insta::assert_snapshot!(type_in("config --explain lambada").fails(64), @r"
+    error: --explain lambada: unknown key `lambada`, did you mean `learner.lambda`?
+    hint: `mackrl config --print` lists every setting, `mackrl config --explain KEY` explains one
+    ");
+    assert!(
+        type_in("config --explain run --schema")
+            .fails(2)
+            .contains("cannot be used with")
+    );
+}
+
+#[test]
+fn the_schema_is_json_and_every_printed_value_has_its_origin() {
+    let schema = type_in("config --schema").succeeds();
+    let schema: serde_json::Value = serde_json::from_str(&schema).expect("a JSON object");
+    let gamma = &schema["properties"]["learner"]["properties"]["gamma"];
+    assert_eq!(gamma["maximum"], 1.0, "{schema}");
+    let printed = type_in("config --print --json --seed 5").succeeds();
+    let printed: Vec<serde_json::Value> = serde_json::from_str(&printed).expect("a JSON array");
+    let seed = printed.iter().find(|setting| setting["key"] == "run.seed");
+    let seed = seed.expect("every setting is printed");
+    assert_eq!(
+        (&seed["value"], &seed["origin"]),
+        (&5.into(), &"--seed 5".into())
+    );
 }
 
 #[test]

@@ -21,6 +21,7 @@ mod observations;
 pub mod random;
 pub mod random_play;
 pub mod registry;
+pub mod settings;
 pub mod skirmish;
 
 pub use entity_set::EntitySet;

@@ -104,8 +104,10 @@ pub fn make_custom(
 }
 
 fn nearest_name(name: &str) -> &'static str {
+    // Comparing takes time and memory proportional to the length, and no name is longer than this.
+    let name: String = name.chars().take(100).collect();
     names()
         .into_iter()
-        .min_by_key(|candidate| strsim::damerau_levenshtein(candidate, name))
+        .min_by_key(|candidate| strsim::damerau_levenshtein(candidate, &name))
         .unwrap_or_default()
 }

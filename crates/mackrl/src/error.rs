@@ -20,6 +20,9 @@ pub enum Error {
     /// A number that is not finite turned up.
     #[error(transparent)]
     NotFinite(Box<NotFinite>),
+    /// Somebody asked to stop; what was begun was given up, and nothing has changed.
+    #[error("stopped as asked")]
+    Stopped,
     /// An environment refused an action, or failed for good.
     #[error(transparent)]
     Step(#[from] mackrl_env::StepError),

@@ -9,6 +9,9 @@ use mackrl_env::skirmish::custom::LENGTH_MAX;
 
 use crate::bounded;
 
+/// Greatest length of a configuration in bytes; it may hold the text of a scenario, every character escaped.
+const FILE_MAX: usize = 2 << 20;
+
 /// The world called `map`, with the settings of `set` laid over those of `builder`; errors about its name begin with what was
 /// `typed`.
 pub(crate) fn world(
@@ -22,7 +25,7 @@ pub(crate) fn world(
     for assignment in set {
         builder = builder.set(assignment)?;
     }
-    Ok(with_scenario(builder)?.build()?.env)
+    Ok(with_scenario(builder)?.build_environment()?)
 }
 
 /// Lays the text of the scenario file that the map names, if it names one.
@@ -35,22 +38,15 @@ pub(crate) fn with_scenario(builder: ConfigBuilder) -> anyhow::Result<ConfigBuil
 
 /// Reads a scenario file, which may be anything: no more of it than a scenario may have.
 pub(crate) fn read_scenario(path: &Path) -> anyhow::Result<String> {
-    let bytes = bounded::read(path, LENGTH_MAX)?;
-    if bytes.is_empty() {
+    let text = bounded::read_text(path, LENGTH_MAX)?;
+    if text.is_empty() {
         let message = format!(
             "{}:1:1: found an empty file, expected a scenario",
             path.display()
         );
         return Err(ConfigError::Scenario { message }.into());
     }
-    String::from_utf8(bytes).map_err(|error| {
-        let message = format!(
-            "{}: not UTF-8 text at byte {}",
-            path.display(),
-            error.utf8_error().valid_up_to()
-        );
-        ConfigError::Scenario { message }.into()
-    })
+    Ok(text)
 }
 
 #[derive(Debug, Clone, Args)]
@@ -100,8 +96,7 @@ impl ConfigurationArgs {
         let mut builder = ConfigBuilder::new().preset(&self.preset)?;
         if let Some(path) = &self.config {
             let name = path.display().to_string();
-            let text =
-                std::fs::read_to_string(path).with_context(|| format!("cannot read {name}"))?;
+            let text = bounded::read_text(path, FILE_MAX)?;
             builder = builder.file(&name, &text)?;
         }
         for (flag, key, value) in self.short_flags() {

@@ -120,17 +120,31 @@ pub(crate) struct MapsArgs {
     pub(crate) check: Option<PathBuf>,
 }
 
-/// Print the configuration that a run would have, and where each value comes from
+/// Print the configuration that a run would have, and where each value comes from; or explain a setting
 ///
 /// Later layers win: built-in values, --preset, --config, the short flags (--map, ...), --set. The output is a complete
 /// configuration file.
 ///
-/// Example: mackrl config --print --preset paper --set learner.gamma=0.95 > mine.toml
+/// Examples: mackrl config --print --preset paper --set learner.gamma=0.95 > mine.toml; mackrl config --explain learner.gamma;
+/// mackrl config --explain run; mackrl config --schema > mackrl.schema.json
 #[derive(Debug, Args)]
 pub(crate) struct ConfigArgs {
     /// Print every setting with its value (the default)
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["explain", "schema"])]
     pub(crate) print: bool,
+
+    /// Explain a setting, or all of a section: meaning, unit, values that it takes, its value in each preset and why
+    #[arg(long, value_name = "KEY", conflicts_with = "schema")]
+    pub(crate) explain: Option<String>,
+
+    /// Print a JSON schema of configuration files (draft 2020-12), for editors and programs
+    #[arg(long)]
+    pub(crate) schema: bool,
+
+    /// Print JSON instead of text
+    #[arg(long)]
+    pub(crate) json: bool,
+
     #[command(flatten)]
     pub(crate) configuration: ConfigurationArgs,
 }

@@ -11,7 +11,7 @@ use mackrl::{
 };
 use mackrl_env::AgentId;
 
-use crate::{args::ExecuteAgentArgs, commands::sc2, failure::Failure, run_folder::Run};
+use crate::{args::ExecuteAgentArgs, failure::Failure, run_folder::Run};
 
 /// Answers what arrives on stdin until it ends.
 pub(crate) fn run(args: &ExecuteAgentArgs) -> anyhow::Result<()> {
@@ -21,7 +21,7 @@ pub(crate) fn run(args: &ExecuteAgentArgs) -> anyhow::Result<()> {
     };
     // An agent needs to know its world; it does not play in it.
     let mut config = run.config.clone();
-    config.env = sc2::simulated(&config.env);
+    config.env = config.env.simulated();
     let world = World::new(&config)?;
     let agents = world.spec().agents;
     if args.agent >= agents {

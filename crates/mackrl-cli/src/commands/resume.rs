@@ -10,6 +10,7 @@ use mackrl::training::Trainer;
 use crate::{
     args::ResumeArgs,
     commands::sc2,
+    failure::printable,
     progress::Detail,
     provenance::CODE,
     run_folder::{Resumption, RunFolder},
@@ -59,18 +60,24 @@ pub(crate) fn go_on(
     } = RunFolder::resume(path, threads)?;
     for damage in damaged {
         // The run continues from an earlier checkpoint, whether anybody reads this or not.
-        let _ = writeln!(io::stderr(), "warning: {damage}; an earlier one is used");
+        let _ = writeln!(
+            io::stderr(),
+            "warning: {}; an earlier one is used",
+            printable(&damage)
+        );
     }
     if let Some(code) = earlier_code {
         let _ = writeln!(
             io::stderr(),
-            "warning: the run was made by code {code} and goes on with {CODE}: it may not be what either of them makes alone"
+            "warning: the run was made by code {} and goes on with {CODE}: it may not be what either of them makes alone",
+            printable(&code)
         );
     }
-    let mut trainer = Trainer::in_world(&config, &sc2::world(&config)?, threads)?;
-    if let Some(checkpoint) = checkpoint {
-        trainer.restore(&checkpoint)?;
-    }
-    let mut training = Reporting::new(trainer, &config);
+    let world = sc2::world(&config)?;
+    let trainer = match checkpoint {
+        Some(checkpoint) => Trainer::resumed(&config, &world, threads, &checkpoint)?,
+        None => Trainer::in_world(&config, &world, threads)?,
+    };
+    let mut training = Reporting::new(trainer, &config, stop);
     training_loop::train_into(&mut folder, &mut training, &config, stop, detail).map(Some)
 }

@@ -22,6 +22,7 @@ pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<()> {
     let mut training = Reporting::new(
         Trainer::in_world(&config, &sc2::world(&config)?, threads)?,
         &config,
+        &stop,
     );
     let mut folder = RunFolder::create(&path, &config, threads)?;
     let detail = args.dashboard.detail();

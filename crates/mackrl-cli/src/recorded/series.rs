@@ -156,7 +156,7 @@ fn display_name(algorithm: &str) -> String {
 
 /// Refuses a key that no setting has.
 fn check_key(key: &str) -> anyhow::Result<()> {
-    if Config::keys().iter().any(|known| known == key) {
+    if Config::keys().any(|known| known == key) {
         return Ok(());
     }
     // The library knows the nearest name, and its error says it.
@@ -222,13 +222,10 @@ fn difference(
     selection: &Selection,
 ) -> Option<(String, [String; 2])> {
     let free = |key: &str| FREE.contains(&key) || selection.by.iter().any(|by| by == key);
-    Config::keys()
-        .into_iter()
-        .filter(|key| !free(key))
-        .find_map(|key| {
-            let values = [one, other].map(|run| setting(&run.config, &key));
-            (values[0] != values[1]).then_some((key, values))
-        })
+    Config::keys().filter(|key| !free(key)).find_map(|key| {
+        let values = [one, other].map(|run| setting(&run.config, &key));
+        (values[0] != values[1]).then_some((key, values))
+    })
 }
 
 fn unlike(

@@ -20,16 +20,18 @@ use anyhow::Context;
 use mackrl::training::Checkpoint;
 
 use super::{
-    CONFIG, METRICS,
+    CHECKPOINTS, CONFIG, METRICS,
     disk::{self, Disk, cannot},
-    manifest::{FORMAT, Fingerprint, Manifest},
+    manifest::{FORMAT, Fingerprint, Growing, Manifest},
+    untrusted,
 };
-use crate::{failure::Failure, provenance::CODE};
+use crate::{bounded, failure::Failure, provenance::CODE};
 
-const CHECKPOINTS: &str = "checkpoints";
 pub(super) const TENSORS: &str = "tensors.safetensors";
 pub(super) const COUNTERS: &str = "counters.json";
 pub(super) const MANIFEST: &str = "manifest.json";
+/// Greatest length of the counters: a few dozen numbers.
+const COUNTERS_MAX: usize = 1 << 20;
 /// Digits of a number in the name of its folder: names sort as numbers do.
 const DIGITS: usize = 12;
 
@@ -45,8 +47,8 @@ pub(super) struct Surroundings {
 pub(super) struct Stored {
     pub(super) number: u64,
     pub(super) checkpoint: Checkpoint,
-    /// Bytes of metrics that belong to it.
-    pub(super) metrics_bytes: usize,
+    /// The metrics that belong to it.
+    pub(super) metrics: Growing,
 }
 
 /// Writes the checkpoint with this number, unless it is there, and removes all but the latest `kept`.
@@ -129,14 +131,18 @@ fn remove(disk: &dyn Disk, run: &Path, number: u64) -> anyhow::Result<()> {
         .with_context(|| cannot("remove", &temporary))
 }
 
-/// The latest checkpoint that is as it was written, if the run has checkpoints, and what is wrong with later ones.
+/// The latest checkpoint that is as it was written, if the run has checkpoints, and what is wrong with later ones. Its tensors
+/// are expected to have at most `tensors_max` bytes.
 ///
 /// # Errors
 /// [`Failure::BadData`] if there are checkpoints and none can be used.
-pub(super) fn latest(run: &Path) -> anyhow::Result<(Option<Stored>, Vec<String>)> {
+pub(super) fn latest(
+    run: &Path,
+    tensors_max: usize,
+) -> anyhow::Result<(Option<Stored>, Vec<String>)> {
     let mut wrong = Vec::new();
     for number in numbers(run)?.into_iter().rev() {
-        match read(run, number) {
+        match read(run, number, tensors_max) {
             Ok(stored) => return Ok((Some(stored), wrong)),
             Err(error) => wrong.push(format!(
                 "{} is damaged: {error:#}",
@@ -174,10 +180,10 @@ pub(super) fn weights_path(run: &Path, number: u64) -> PathBuf {
 }
 
 /// Reads a checkpoint, and compares everything with its manifest.
-fn read(run: &Path, number: u64) -> anyhow::Result<Stored> {
+fn read(run: &Path, number: u64, tensors_max: usize) -> anyhow::Result<Stored> {
     let folder = place(run, number);
-    let content = |path: PathBuf| fs::read(&path).with_context(|| cannot("read", &path));
-    let manifest: Manifest = serde_json::from_slice(&content(folder.join(MANIFEST))?)
+    let manifest = bounded::read(&folder.join(MANIFEST), untrusted::TEXT_MAX)?;
+    let manifest: Manifest = serde_json::from_slice(&manifest)
         .with_context(|| cannot("understand", &folder.join(MANIFEST)))?;
     anyhow::ensure!(
         manifest.format == FORMAT,
@@ -186,26 +192,28 @@ fn read(run: &Path, number: u64) -> anyhow::Result<Stored> {
         manifest.format
     );
     let differs = |path: &Path| format!("{} is not what {MANIFEST} says", path.display());
-    let own = |name: &str| {
+    let own = |name: &str, length_max| {
         let path = folder.join(name);
-        let content = content(path.clone())?;
+        let content = bounded::read(&path, length_max)?;
         let same = manifest.files.get(name) == Some(&Fingerprint::of(&content));
         anyhow::ensure!(same, differs(&path));
         Ok(content)
     };
     let beginning = |name: &str, fingerprint: &Fingerprint| {
         let path = run.join(name);
-        let begins = fingerprint.begins(&content(path.clone())?);
+        let file = fs::File::open(&path).with_context(|| cannot("read", &path))?;
+        let begins = fingerprint.begins(file);
+        let begins = begins.with_context(|| cannot("read", &path))?;
         begins.with_context(|| differs(&path))
     };
     beginning(CONFIG, &manifest.config)?;
     Ok(Stored {
         number,
         checkpoint: Checkpoint {
-            tensors: own(TENSORS)?,
-            counters: own(COUNTERS)?,
+            tensors: own(TENSORS, tensors_max)?,
+            counters: own(COUNTERS, COUNTERS_MAX)?,
         },
-        metrics_bytes: beginning(METRICS, &manifest.metrics)?,
+        metrics: beginning(METRICS, &manifest.metrics)?,
     })
 }
 

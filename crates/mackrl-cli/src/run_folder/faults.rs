@@ -150,6 +150,7 @@ fn no_failing_operation_costs_a_checkpoint() {
             }
         }
     }
+    println!("{cases} failing operations");
     assert!(cases > 80, "{cases} cases");
 }
 

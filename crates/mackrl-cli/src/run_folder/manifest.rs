@@ -1,6 +1,9 @@
 //! What belongs to a checkpoint, by length and hash.
 
-use std::collections::BTreeMap;
+use std::{
+    collections::BTreeMap,
+    io::{self, Read},
+};
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -27,11 +30,10 @@ impl Fingerprint {
         growing.fingerprint()
     }
 
-    /// Whether `content` begins with what this is the fingerprint of; gives the length of that.
-    pub(super) fn begins(&self, content: &[u8]) -> Option<usize> {
-        let bytes = usize::try_from(self.bytes).ok()?;
-        let beginning = content.get(..bytes)?;
-        (Self::of(beginning) == *self).then_some(bytes)
+    /// Whether what `reader` gives begins with what this is the fingerprint of; gives that beginning's own length and hash.
+    pub(super) fn begins(&self, reader: impl Read) -> io::Result<Option<Growing>> {
+        let beginning = Growing::read(reader.take(self.bytes))?;
+        Ok((beginning.fingerprint() == *self).then_some(beginning))
     }
 }
 
@@ -47,6 +49,25 @@ impl Growing {
     pub(super) fn append(&mut self, content: &[u8]) {
         self.bytes += content.len() as u64;
         self.hasher.update(content);
+    }
+
+    /// Follows what `reader` gives to its end, however long it is.
+    pub(super) fn read(mut reader: impl Read) -> io::Result<Self> {
+        let mut so_far = Self::default();
+        let mut buffer = [0; 1 << 16];
+        loop {
+            match reader.read(&mut buffer) {
+                Ok(0) => return Ok(so_far),
+                Ok(length) => so_far.append(&buffer[..length]),
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    /// Its length so far.
+    pub(super) const fn bytes(&self) -> u64 {
+        self.bytes
     }
 
     /// Of everything so far.
@@ -91,8 +112,9 @@ mod tests {
                 "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
             )
         );
-        assert_eq!(fingerprint.begins(b"abcd"), Some(3));
-        assert_eq!(fingerprint.begins(b"abd"), None);
-        assert_eq!(fingerprint.begins(b"ab"), None);
+        let begins = |content: &[u8]| fingerprint.begins(content).unwrap().is_some();
+        assert!(begins(b"abcd"));
+        assert!(!begins(b"abd"));
+        assert!(!begins(b"ab"));
     }
 }

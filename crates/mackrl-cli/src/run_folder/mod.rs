@@ -7,6 +7,7 @@
 //! DIR/checkpoints/          the latest few, from which the run continues
 //! DIR/dumps/                updates that were refused because of a number that is not finite
 //! DIR/weights.safetensors   the policy and the critic; written at the end
+//! DIR/events.out.tfevents.* the metrics for TensorBoard, if `run.tensorboard` is set; one file for each process that trained
 //! DIR/lock                  held by the process that writes
 //! ```
 //!
@@ -17,10 +18,12 @@
 mod checkpoints;
 mod disk;
 mod dumps;
+mod event_file;
 mod latest;
 mod manifest;
 mod recorded;
 mod run;
+mod untrusted;
 
 use std::{
     fs::{self, File, OpenOptions, TryLockError},
@@ -29,16 +32,21 @@ use std::{
 };
 
 use anyhow::Context;
-use mackrl::{config::Config, training::Checkpoint};
+use mackrl::{
+    config::Config,
+    training::{Checkpoint, assembly::tensors_bytes_max},
+};
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    bounded,
     failure::Failure,
     provenance::{CODE, Provenance},
 };
 use checkpoints::Surroundings;
 use disk::{Disk, RealDisk, cannot, cannot_write};
 pub(crate) use dumps::{Dump, Refusal};
+use event_file::EventFile;
 pub(crate) use latest::{LatestRow, latest_row};
 use manifest::{Fingerprint, Growing};
 pub(crate) use recorded::{Recorded, Row, timeless};
@@ -49,6 +57,7 @@ pub(crate) const METRICS: &str = "metrics.jsonl";
 const RUN: &str = "run.json";
 const WEIGHTS: &str = "weights.safetensors";
 const LOCK: &str = "lock";
+const CHECKPOINTS: &str = "checkpoints";
 
 /// How far a run has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -100,6 +109,7 @@ pub(crate) struct RunFolder {
     config: Fingerprint,
     metrics: File,
     metrics_so_far: Growing,
+    events: Option<EventFile>,
     checkpoints_kept: usize,
     record: RunRecord,
     /// Nobody else writes while this is open.
@@ -168,7 +178,7 @@ impl RunFolder {
         // Somebody else may have been quicker, and be done already.
         Self::check_free(path)?;
         disk::replace(&RealDisk, &path.join(CONFIG), config.to_toml().as_bytes())?;
-        Self::open(path, config, threads, lock, 0)
+        Self::open(path, config, threads, lock, Growing::default())
     }
 
     /// Creates the folder of a new run for another process to make: with its configuration, and nothing else.
@@ -197,6 +207,7 @@ impl RunFolder {
     /// [`Failure::NotARun`], [`Failure::FolderLocked`] if another process writes there, [`Failure::UpdateRefused`] if the run
     /// stopped at an update that this program would refuse again, [`Failure::BadData`] if no checkpoint can be used; otherwise the path that could not be read or written.
     pub(crate) fn resume(path: &Path, threads: usize) -> anyhow::Result<Resumption> {
+        untrusted::check(path)?;
         let config = run::read_config(path)?;
         let lock = lock(path)?;
         let record = read_record(path);
@@ -215,31 +226,32 @@ impl RunFolder {
                 None => "of an early version".to_owned(),
             })
             .filter(|code| code != CODE);
-        let (latest, damaged) = checkpoints::latest(path)?;
-        let (number, metrics_bytes) = latest.as_ref().map_or((None, 0), |stored| {
-            (Some(stored.number), stored.metrics_bytes)
-        });
-        checkpoints::tidy(&RealDisk, path, number)?;
+        let (latest, damaged) = checkpoints::latest(path, tensors_bytes_max(&config)?)?;
+        checkpoints::tidy(&RealDisk, path, latest.as_ref().map(|stored| stored.number))?;
+        let (metrics, checkpoint) = latest
+            .map(|stored| (stored.metrics, stored.checkpoint))
+            .unzip();
+        let metrics = metrics.unwrap_or_default();
         Ok(Resumption {
-            folder: Self::open(path, &config, threads, lock, metrics_bytes)?,
+            folder: Self::open(path, &config, threads, lock, metrics)?,
             config,
-            checkpoint: latest.map(|stored| stored.checkpoint),
+            checkpoint,
             damaged,
             earlier_code,
         })
     }
 
-    /// Opens the folder with so many bytes of metrics.
+    /// Opens the folder with these metrics.
     fn open(
         path: &Path,
         config: &Config,
         threads: usize,
         lock: File,
-        metrics_bytes: usize,
+        metrics_so_far: Growing,
     ) -> anyhow::Result<Self> {
         let config_path = path.join(CONFIG);
-        let config_text = fs::read(&config_path).with_context(|| cannot("read", &config_path))?;
-        let (metrics, metrics_so_far) = open_metrics(&path.join(METRICS), metrics_bytes)?;
+        let config_text = bounded::read(&config_path, untrusted::TEXT_MAX)?;
+        let metrics = open_metrics(&path.join(METRICS), metrics_so_far.bytes())?;
         let mut record = read_record(path).unwrap_or_else(|| RunRecord {
             command: std::env::args().collect(),
             provenance: Vec::new(),
@@ -259,6 +271,7 @@ impl RunFolder {
             config: Fingerprint::of(&config_text),
             metrics,
             metrics_so_far,
+            events: None,
             checkpoints_kept: config.run.checkpoints_kept,
             record,
             _lock: lock,
@@ -272,6 +285,15 @@ impl RunFolder {
         &self.path
     }
 
+    /// Begins an event file for TensorBoard, in which rows of metrics stand from now on; the run has played `steps_env`
+    /// environment steps, of which it has told already.
+    pub(crate) fn write_events(&mut self, steps_env: u64) -> anyhow::Result<()> {
+        let forgotten_from = if steps_env == 0 { 0 } else { steps_env + 1 };
+        let events = EventFile::create(&*self.disk, &self.path, forgotten_from)?;
+        self.events = Some(events);
+        Ok(())
+    }
+
     /// Adds one line to the metrics.
     pub(crate) fn append_metrics(&mut self, object: &str) -> anyhow::Result<()> {
         debug_assert!(!object.contains('\n'), "a row of metrics is one line");
@@ -280,6 +302,9 @@ impl RunFolder {
             .write(&mut self.metrics, line.as_bytes())
             .with_context(|| cannot_write(&self.path.join(METRICS), line.len()))?;
         self.metrics_so_far.append(line.as_bytes());
+        if let Some(events) = &mut self.events {
+            events.append(&*self.disk, object)?;
+        }
         Ok(())
     }
 
@@ -416,18 +441,16 @@ fn lock(path: &Path) -> anyhow::Result<File> {
 }
 
 /// Opens the metrics for appending, and cuts off everything after the first `bytes` bytes.
-fn open_metrics(path: &Path, bytes: usize) -> anyhow::Result<(File, Growing)> {
+fn open_metrics(path: &Path, bytes: u64) -> anyhow::Result<File> {
     let file = OpenOptions::new()
         .create(true)
         .append(true)
         .open(path)
         .with_context(|| cannot("open", path))?;
-    file.set_len(bytes as u64)
+    file.set_len(bytes)
         .and_then(|()| file.sync_all())
         .with_context(|| cannot("cut", path))?;
-    let mut so_far = Growing::default();
-    so_far.append(&fs::read(path).with_context(|| cannot("read", path))?);
-    Ok((file, so_far))
+    Ok(file)
 }
 
 fn recorded_status(path: &Path) -> Option<Status> {
@@ -435,8 +458,8 @@ fn recorded_status(path: &Path) -> Option<Status> {
 }
 
 fn read_record(path: &Path) -> Option<RunRecord> {
-    let text = fs::read_to_string(path.join(RUN)).ok()?;
-    serde_json::from_str(&text).ok()
+    let json = bounded::read(&path.join(RUN), untrusted::TEXT_MAX).ok()?;
+    serde_json::from_slice(&json).ok()
 }
 
 #[cfg(test)]

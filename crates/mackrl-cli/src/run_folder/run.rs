@@ -1,15 +1,14 @@
 //! Reading a run that was made earlier.
 
-use std::{
-    fs, io,
-    path::{Path, PathBuf},
+use std::path::{Path, PathBuf};
+
+use mackrl::{
+    config::{Config, ConfigBuilder},
+    training::assembly::tensors_bytes_max,
 };
 
-use anyhow::Context;
-use mackrl::config::{Config, ConfigBuilder};
-
-use super::{CONFIG, WEIGHTS, checkpoints, disk::cannot};
-use crate::failure::Failure;
+use super::{CONFIG, WEIGHTS, checkpoints, untrusted};
+use crate::{bounded, failure::Failure};
 
 /// A run that was made earlier.
 #[derive(Debug)]
@@ -28,12 +27,13 @@ impl Run {
     /// # Errors
     /// [`Failure::NotARun`] if there is no configuration; otherwise what is wrong with which file.
     pub(crate) fn open(path: &Path) -> anyhow::Result<Self> {
+        untrusted::check(path)?;
         let config = read_config(path)?;
         let weights_path = path.join(WEIGHTS);
         if weights_path.exists() {
             return Self::with_weights(config, weights_path);
         }
-        let (latest, _) = checkpoints::latest(path)?;
+        let (latest, _) = checkpoints::latest(path, tensors_bytes_max(&config)?)?;
         let stored = latest.ok_or_else(|| Failure::BadData {
             message: format!(
                 "{} has no {WEIGHTS} and no checkpoint: the run has only begun",
@@ -52,11 +52,12 @@ impl Run {
     /// # Errors
     /// As [`Run::open`].
     pub(crate) fn open_with_weights(path: &Path, weights: &Path) -> anyhow::Result<Self> {
+        untrusted::check(path)?;
         Self::with_weights(read_config(path)?, weights.to_owned())
     }
 
     fn with_weights(config: Config, weights_path: PathBuf) -> anyhow::Result<Self> {
-        let weights = fs::read(&weights_path).with_context(|| cannot("read", &weights_path))?;
+        let weights = bounded::read(&weights_path, tensors_bytes_max(&config)?)?;
         Ok(Self {
             config,
             weights,
@@ -68,13 +69,11 @@ impl Run {
 /// The configuration of the run at `path`.
 pub(super) fn read_config(path: &Path) -> anyhow::Result<Config> {
     let config_path = path.join(CONFIG);
-    let text = match fs::read_to_string(&config_path) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => {
-            let folder = path.to_owned();
-            return Err(Failure::NotARun { folder }.into());
-        }
-        text => text.with_context(|| cannot("read", &config_path))?,
-    };
+    if !config_path.exists() {
+        let folder = path.to_owned();
+        return Err(Failure::NotARun { folder }.into());
+    }
+    let text = bounded::read_text(&config_path, untrusted::TEXT_MAX)?;
     let config = ConfigBuilder::new()
         .file(&config_path.display().to_string(), &text)?
         .build()?;

@@ -82,3 +82,61 @@ fn a_damaged_configuration_is_named_with_file_and_line() {
         "{error}"
     );
 }
+
+#[cfg(unix)]
+#[test]
+fn nothing_outside_a_strangers_run_folder_is_touched() {
+    use std::os::unix::fs::symlink;
+
+    for own in [
+        CONFIG,
+        METRICS,
+        RUN,
+        WEIGHTS,
+        LOCK,
+        CHECKPOINTS,
+        "run.json.tmp",
+    ] {
+        let parent = tempfile::tempdir().unwrap();
+        let path = free_path(&parent);
+        RunFolder::create(&path, &Config::default(), 1).unwrap();
+        let mine = parent.path().join("mine");
+        fs::write(&mine, Config::default().to_toml()).unwrap();
+        let link = path.join(own);
+        let _ = fs::remove_file(&link);
+        symlink(&mine, &link).unwrap();
+        for error in [
+            RunFolder::resume(&path, 1).unwrap_err(),
+            Run::open(&path).unwrap_err(),
+        ] {
+            let message = error.to_string();
+            assert!(
+                message.contains("is a symbolic link, expected a"),
+                "{message}"
+            );
+            assert!(message.contains(own), "{message}");
+        }
+        assert_eq!(
+            fs::read_to_string(&mine).unwrap(),
+            Config::default().to_toml()
+        );
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_checkpoint_that_leads_elsewhere_is_refused() {
+    let parent = tempfile::tempdir().unwrap();
+    let path = free_path(&parent);
+    RunFolder::create(&path, &Config::default(), 1).unwrap();
+    let elsewhere = parent.path().join("elsewhere");
+    fs::create_dir_all(elsewhere.join("000000000007.tmp")).unwrap();
+    fs::create_dir(path.join(CHECKPOINTS)).unwrap();
+    std::os::unix::fs::symlink(&elsewhere, path.join(CHECKPOINTS).join("000000000001")).unwrap();
+    let message = RunFolder::resume(&path, 1).unwrap_err().to_string();
+    assert!(
+        message.contains("is a symbolic link, expected a folder"),
+        "{message}"
+    );
+    assert!(elsewhere.join("000000000007.tmp").exists());
+}

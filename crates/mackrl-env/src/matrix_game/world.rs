@@ -8,8 +8,6 @@
 
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
-
 use super::{
     ACTIONS, AGENTS, DealtCards, InvalidProbability, Matrix, Observation, ObservationDistribution,
     Payoffs, payoff,
@@ -17,7 +15,7 @@ use super::{
 use crate::{
     Action, AgentId, Draw, EntityId, EntitySet, Environment, EnvironmentSpec, EpisodeEnd,
     EpisodeKey, EpisodeStatistics, IllegalAction, KnownEntities, ObservationMut, PriorKnowledge,
-    StepError, TimeStep,
+    StepError, TimeStep, declare_settings, settings::Accepts,
 };
 
 const ENTITIES: usize = AGENTS + 1;
@@ -27,26 +25,16 @@ const LIT: usize = 2;
 const ATTENTIVE: usize = 3;
 const IDENTITY: usize = 4;
 
-/// What can be chosen about the game.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct MatrixGameSettings {
-    /// Which pair of matrices is played.
-    pub payoffs: Payoffs,
-    /// How often agents see the matrix.
-    pub distribution: ObservationDistribution,
-    /// p, the horizontal axis of Figure 5, in [0, 1].
-    pub common_knowledge: f64,
-}
-
-impl Default for MatrixGameSettings {
-    /// The published figure's game in the middle of its axis.
-    fn default() -> Self {
-        Self {
-            payoffs: Payoffs::default(),
-            distribution: ObservationDistribution::default(),
-            common_knowledge: 0.5,
-        }
+declare_settings! {
+    /// What can be chosen about the game: the published figure's game, in the middle of its axis, unless set.
+    #[derive(Copy)]
+    pub struct MatrixGameSettings {
+        /// Which pair of matrices is played: that of the published code, or the one printed in the paper.
+        payoffs: Payoffs = Payoffs::Coded, Accepts::OneOf(&["coded", "printed"]);
+        /// How often agents see the matrix: as in the 2018 paper, or as in the NeurIPS version.
+        distribution: ObservationDistribution = ObservationDistribution::Y2018, Accepts::OneOf(&["2018", "neurips"]);
+        /// p, the probability on the horizontal axis of Figure 5.
+        common_knowledge: f64 = 0.5, Accepts::within(0.0, 1.0);
     }
 }
 

@@ -35,6 +35,6 @@ pub enum SkirmishError {
         /// Its value.
         found: String,
         /// What it may be.
-        expected: &'static str,
+        expected: String,
     },
 }

@@ -2,7 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::skirmish::{error::SkirmishError, unit_types::UnitData};
+use crate::{
+    declare_settings,
+    settings::Accepts,
+    skirmish::{error::SkirmishError, unit_types::UnitData},
+};
 
 /// Which of SMAC's peculiarities are kept.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -28,162 +32,91 @@ pub enum EnemyBehaviour {
     Hunt,
 }
 
-/// How a skirmish is played and shown to agents.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SkirmishSettings {
-    /// Which statistics units have.
-    pub units: UnitData,
-    /// Which of SMAC's peculiarities are kept.
-    pub compat: Compatibility,
-    /// What the enemies are told when an episode begins. Not in SMAC, whose maps say it.
-    pub enemy_order: EnemyBehaviour,
-    /// Map units by which a unit starts beside its place on the map, at most, along each axis; drawn anew for every episode; in
-    /// \[0, 4\]. Not in SMAC, where the engine places units: see `DEVIATIONS.md`.
-    pub spawn_scatter: f32,
-    /// Map units that a move is ordered to go, in (0, 32]. Half of it is how far ahead availability looks.
-    pub move_amount: f32,
-    /// Map units within which an agent sees, centre to centre, exclusive; in (0, 64].
-    pub sight_range: f32,
-    /// Map units within which a target may be chosen, centre to centre, inclusive; in (0, 64] and below `sight_range`.
-    pub shoot_range: f32,
-    /// Game loops in a step, in 1..=64.
-    pub step_mul: u8,
-    /// Whether only what happens to enemies is rewarded.
-    pub reward_only_positive: bool,
-    /// Whether rewards are scaled so that the greatest return is `reward_scale_rate`.
-    pub reward_scale: bool,
-    /// The greatest return after scaling, > 0.
-    pub reward_scale_rate: f32,
-    /// Reward for a killed enemy, ≥ 0.
-    pub reward_death_value: f32,
-    /// Reward for winning, ≥ 0.
-    pub reward_win: f32,
-    /// Reward for losing, usually ≤ 0.
-    pub reward_defeat: f32,
-    /// Weight of the team's own losses when `reward_only_positive` is off, ≥ 0.
-    pub reward_negative_scale: f32,
-    /// Whether only the outcome is rewarded: 1, 0 or −1.
-    pub reward_sparse: bool,
-    /// Whether agents see the last action of the allies they see.
-    pub obs_last_action: bool,
-    /// Whether agents see their own life and shield.
-    pub obs_own_health: bool,
-    /// Whether agents see the life and shields of those in sight.
-    pub obs_all_health: bool,
-    /// Whether agents see at eight points around them whether one can walk there.
-    pub obs_pathing_grid: bool,
-    /// Whether agents see the height of the ground at these points and below them.
-    pub obs_terrain_height: bool,
-    /// Whether agents see which part of the episode's limit has passed.
-    pub obs_timestep_number: bool,
-    /// Whether the state is the agents' observations, one behind the other.
-    pub obs_instead_of_state: bool,
-    /// Whether the state holds every agent's last action.
-    pub state_last_action: bool,
-    /// Whether the state holds which part of the episode's limit has passed.
-    pub state_timestep_number: bool,
-}
-
-impl Default for SkirmishSettings {
-    fn default() -> Self {
-        Self {
-            units: UnitData::Liberty,
-            compat: Compatibility::Smac,
-            enemy_order: EnemyBehaviour::Map,
-            spawn_scatter: 0.5,
-            move_amount: 2.0,
-            sight_range: 9.0,
-            shoot_range: 6.0,
-            step_mul: 8,
-            reward_only_positive: true,
-            reward_scale: true,
-            reward_scale_rate: 20.0,
-            reward_death_value: 10.0,
-            reward_win: 200.0,
-            reward_defeat: 0.0,
-            reward_negative_scale: 0.5,
-            reward_sparse: false,
-            obs_last_action: false,
-            obs_own_health: true,
-            obs_all_health: true,
-            obs_pathing_grid: false,
-            obs_terrain_height: false,
-            obs_timestep_number: false,
-            obs_instead_of_state: false,
-            state_last_action: true,
-            state_timestep_number: false,
-        }
+declare_settings! {
+    /// How a skirmish is played and shown to agents.
+    pub struct SkirmishSettings {
+        /// Which statistics units have: those of Wings of Liberty, as SMAC's maps use them, or those of Legacy of the Void.
+        units: UnitData = UnitData::Liberty, Accepts::OneOf(&["liberty", "lotv"]);
+        /// Which of SMAC's peculiarities are kept: all (absolute rewards, swapped one-hot types of enemies) or none.
+        compat: Compatibility = Compatibility::Smac, Accepts::OneOf(&["smac", "clean"]);
+        /// What the enemies are told when an episode begins: what their map says, or to go for the nearest agent, wherever it is. Not in
+        /// SMAC, whose maps say it.
+        enemy_order: EnemyBehaviour = EnemyBehaviour::Map, Accepts::OneOf(&["map", "hunt"]);
+        /// Map units by which a unit starts beside its place on the map, at most, along each axis; drawn anew for every episode. Not
+        /// in SMAC, where the engine places units: see `DEVIATIONS.md`.
+        spawn_scatter: f32 = 0.5, Accepts::within(0.0, 4.0);
+        /// Map units that a move is ordered to go. Half of it is how far ahead availability looks.
+        move_amount: f32 = 2.0, Accepts::above_within(0.0, 32.0);
+        /// Map units within which an agent sees, centre to centre, exclusive.
+        sight_range: f32 = 9.0, Accepts::above_within(0.0, 64.0);
+        /// Map units within which a target may be chosen, centre to centre, inclusive; below `sight_range`.
+        shoot_range: f32 = 6.0, Accepts::above_within(0.0, 64.0);
+        /// Game loops in a step, of which the game has 22.4 in a second.
+        step_mul: u8 = 8, Accepts::integer(1, 64);
+        /// Whether only what happens to enemies is rewarded.
+        reward_only_positive: bool = true, Accepts::Flag;
+        /// Whether rewards are scaled so that the greatest return is `reward_scale_rate`.
+        reward_scale: bool = true, Accepts::Flag;
+        /// The greatest return after scaling, in units of reward.
+        reward_scale_rate: f32 = 20.0, Accepts::above_within(0.0, 1e9);
+        /// Reward for a killed enemy, before scaling, where a point of damage gives 1.
+        reward_death_value: f32 = 10.0, Accepts::within(0.0, 1e9);
+        /// Reward for winning, before scaling.
+        reward_win: f32 = 200.0, Accepts::within(0.0, 1e9);
+        /// Reward for losing, before scaling; usually 0 or less.
+        reward_defeat: f32 = 0.0, Accepts::within(-1e9, 1e9);
+        /// Weight of the team's own losses when `reward_only_positive` is off.
+        reward_negative_scale: f32 = 0.5, Accepts::within(0.0, 1e9);
+        /// Whether only the outcome is rewarded: 1, 0 or −1.
+        reward_sparse: bool = false, Accepts::Flag;
+        /// Whether agents see the last action of the allies they see.
+        obs_last_action: bool = false, Accepts::Flag;
+        /// Whether agents see their own life and shield.
+        obs_own_health: bool = true, Accepts::Flag;
+        /// Whether agents see the life and shields of those in sight.
+        obs_all_health: bool = true, Accepts::Flag;
+        /// Whether agents see at eight points around them whether one can walk there.
+        obs_pathing_grid: bool = false, Accepts::Flag;
+        /// Whether agents see the height of the ground at these points and below them.
+        obs_terrain_height: bool = false, Accepts::Flag;
+        /// Whether agents see which part of the episode's limit has passed.
+        obs_timestep_number: bool = false, Accepts::Flag;
+        /// Whether the state is the agents' observations, one behind the other.
+        obs_instead_of_state: bool = false, Accepts::Flag;
+        /// Whether the state holds every agent's last action.
+        state_last_action: bool = true, Accepts::Flag;
+        /// Whether the state holds which part of the episode's limit has passed.
+        state_timestep_number: bool = false, Accepts::Flag;
     }
 }
 
 impl SkirmishSettings {
-    /// Checks every range.
+    /// Whether agents aim no further than they see.
+    #[must_use]
+    pub fn aims_within_sight(&self) -> bool {
+        self.shoot_range < self.sight_range
+    }
+
+    /// Checks every range, and that agents aim no further than they see.
     ///
     /// # Errors
     /// [`SkirmishError::Setting`] names the first setting out of range.
     pub fn validate(&self) -> Result<(), SkirmishError> {
-        let within = |value: f32, greatest: f32| value > 0.0 && value <= greatest;
-        let weight = |value: f32| (0.0..=1e9).contains(&value);
-        check(
-            "spawn_scatter",
-            self.spawn_scatter,
-            (0.0..=4.0).contains(&self.spawn_scatter),
-            "in [0, 4]",
-        )?;
-        check(
-            "move_amount",
-            self.move_amount,
-            within(self.move_amount, 32.0),
-            "in (0, 32]",
-        )?;
-        check(
-            "sight_range",
-            self.sight_range,
-            within(self.sight_range, 64.0),
-            "in (0, 64]",
-        )?;
-        check(
-            "shoot_range",
-            self.shoot_range,
-            within(self.shoot_range, 64.0) && self.shoot_range < self.sight_range,
-            "in (0, sight_range), because agents can only aim at what they see",
-        )?;
-        let step_mul = f32::from(self.step_mul);
-        check("step_mul", step_mul, within(step_mul, 64.0), "in 1..=64")?;
-        let rate = self.reward_scale_rate;
-        check("reward_scale_rate", rate, within(rate, 1e9), "in (0, 1e9]")?;
-        let weights = [
-            ("reward_death_value", self.reward_death_value),
-            ("reward_win", self.reward_win),
-            ("reward_negative_scale", self.reward_negative_scale),
-        ];
-        for (key, value) in weights {
-            check(key, value, weight(value), "in [0, 1e9]")?;
+        if let Some(violation) = self.violation() {
+            return Err(SkirmishError::Setting {
+                key: violation.name,
+                found: violation.found,
+                expected: violation.accepts.to_string(),
+            });
         }
-        let defeat = self.reward_defeat;
-        check(
-            "reward_defeat",
-            defeat,
-            weight(defeat.abs()),
-            "in [-1e9, 1e9]",
-        )
-    }
-}
-
-fn check(
-    key: &'static str,
-    found: f32,
-    holds: bool,
-    expected: &'static str,
-) -> Result<(), SkirmishError> {
-    if holds {
-        Ok(())
-    } else {
+        if self.aims_within_sight() {
+            return Ok(());
+        }
         Err(SkirmishError::Setting {
-            key,
-            found: found.to_string(),
-            expected,
+            key: "shoot_range",
+            found: format!("{:?}", self.shoot_range),
+            expected: "a number in (0, sight_range), because agents can only aim at what they see"
+                .to_owned(),
         })
     }
 }

@@ -2,9 +2,10 @@
 
 use std::{fmt, str::FromStr};
 
+use mackrl_env::settings::Accepts;
 use serde::{Deserialize, Serialize};
 
-use crate::partition::PartitionSchedule;
+use crate::partition::{PartitionSchedule, partition_count};
 
 /// What learns.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -48,8 +49,33 @@ pub enum PartitionChoice {
     All,
     /// One partition a step, by the circle method on a relabelling drawn from the shared seed.
     RoundRobin,
-    /// This many partitions (at least 1), drawn once from the shared seed and kept for the whole run.
+    /// This many partitions (1 to [`Self::SAMPLED_MAX`]), drawn once from the shared seed and kept for the whole run.
     Sampled(usize),
+}
+
+impl PartitionChoice {
+    /// The largest sample: the selector has an output for each, so more would cost memory and time without use.
+    pub const SAMPLED_MAX: usize = 9999;
+
+    /// What can be written.
+    pub(super) const ACCEPTS: Accepts = Accepts::Text {
+        expects: "`all`, `round-robin` or `sampled:K` with K in [1, 9999]",
+        pattern: Some("^(all|round-robin|sampled:[1-9][0-9]{0,3})$"),
+    };
+
+    /// What could be chosen instead, if a team of so many agents has not the partitions that this asks for.
+    pub(super) fn expected_of(self, agents: usize) -> Option<String> {
+        match self {
+            Self::All if agents > PartitionSchedule::MOST_AGENTS_ENUMERATED => {
+                Some("`round-robin` or `sampled:K`".to_owned())
+            }
+            Self::Sampled(count) if count as u128 > partition_count(agents) => Some(format!(
+                "`all` or `sampled:K` with K <= {}",
+                partition_count(agents)
+            )),
+            _ => None,
+        }
+    }
 }
 
 impl From<PartitionChoice> for PartitionSchedule {
@@ -82,11 +108,9 @@ impl FromStr for PartitionChoice {
             _ => text
                 .strip_prefix("sampled:")
                 .and_then(|count| count.parse().ok())
-                .filter(|&count| count >= 1)
+                .filter(|count| (1..=Self::SAMPLED_MAX).contains(count))
                 .map(Self::Sampled)
-                .ok_or_else(|| {
-                    format!("`{text}` is not all, round-robin or sampled:K with K >= 1")
-                }),
+                .ok_or_else(|| format!("`{text}` is not {}", Self::ACCEPTS)),
         }
     }
 }
@@ -121,8 +145,27 @@ mod tests {
     }
 
     #[test]
-    fn a_sample_has_at_least_one_partition() {
-        for text in ["sampled:0", "sampled:", "sampled:-1", "sampled", "some"] {
+    fn a_team_is_not_asked_for_partitions_that_it_does_not_have() {
+        assert_eq!(PartitionChoice::All.expected_of(8), None);
+        assert!(PartitionChoice::All.expected_of(9).is_some());
+        assert_eq!(PartitionChoice::RoundRobin.expected_of(27), None);
+        assert_eq!(PartitionChoice::Sampled(3).expected_of(3), None);
+        assert_eq!(
+            PartitionChoice::Sampled(4).expected_of(3).as_deref(),
+            Some("`all` or `sampled:K` with K <= 3")
+        );
+    }
+
+    #[test]
+    fn a_sample_has_at_least_one_partition_and_not_too_many() {
+        for text in [
+            "sampled:0",
+            "sampled:",
+            "sampled:-1",
+            "sampled:10000",
+            "sampled",
+            "some",
+        ] {
             assert!(text.parse::<PartitionChoice>().is_err(), "{text}");
         }
     }

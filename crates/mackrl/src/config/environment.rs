@@ -4,13 +4,14 @@ use mackrl_env::{
     Environment,
     matrix_game::{MatrixGameSettings, payoff_text},
     registry::{self, MATRIX_GAME},
-    skirmish::{Skirmish, SkirmishError, SkirmishSettings, scenario},
+    settings::Accepts,
+    skirmish::{Skirmish, SkirmishSettings, scenario},
 };
 use serde::{Deserialize, Serialize};
 
 use crate::{
     Error,
-    config::{ConfigError, Engine, Origin, Setting},
+    config::{ConfigError, Engine, Origin, Setting, settings::in_section},
 };
 
 /// The world that is played in.
@@ -50,28 +51,44 @@ impl Default for EnvironmentConfig {
 }
 
 impl EnvironmentConfig {
-    pub(super) const SETTINGS: &[Setting] = &[
-        Setting {
-            key: "env.map",
-            documentation: "Name of the world in the registry, such as `3m`, or a scenario file ending in .toml; `mackrl maps` lists them.",
-            expects: "a name that `mackrl maps` lists, or a file ending in .toml",
-        },
-        Setting {
-            key: "env.scenario",
-            documentation: "Text of a scenario that is played instead of a shipped map; filled in from the file that env.map names.",
-            expects: "the text of a scenario file, as `mackrl maps --check` accepts it",
-        },
-        Setting {
-            key: "env.engine",
-            documentation: "What plays the battles: the built-in simulator, or StarCraft II on this machine.",
-            expects: "`simulator` or `sc2`",
-        },
-        Setting {
-            key: "env.game_version",
-            documentation: "Version of StarCraft II, such as 4.10.0; empty for the latest that is installed.",
-            expects: "a version of StarCraft II, or nothing",
-        },
-    ];
+    /// Its own settings, then those of the worlds.
+    pub(super) fn settings() -> Vec<Setting> {
+        let own = [
+            Setting {
+                key: "env.map".to_owned(),
+                meaning: "Name of the world, or a scenario file ending in .toml.",
+                accepts: Accepts::Text {
+                    expects: "a name that `mackrl maps` lists, or a file ending in .toml",
+                    pattern: None,
+                },
+            },
+            Setting {
+                key: "env.scenario".to_owned(),
+                meaning: "Text of a scenario that is played instead of a shipped map; filled in from the file that env.map names.",
+                accepts: Accepts::Text {
+                    expects: "the text of a scenario file, as `mackrl maps --check` accepts it",
+                    pattern: None,
+                },
+            },
+            Setting {
+                key: "env.engine".to_owned(),
+                meaning: "What plays the battles: the built-in simulator, or StarCraft II on this machine.",
+                accepts: Accepts::OneOf(&["simulator", "sc2"]),
+            },
+            Setting {
+                key: "env.game_version".to_owned(),
+                meaning: "Version of StarCraft II, such as 4.10.0; empty for the latest that is installed.",
+                accepts: Accepts::Text {
+                    expects: "a version of StarCraft II, or nothing",
+                    pattern: None,
+                },
+            },
+        ];
+        own.into_iter()
+            .chain(in_section("env", SkirmishSettings::SETTINGS))
+            .chain(in_section("env.matrix_game", MatrixGameSettings::SETTINGS))
+            .collect()
+    }
 
     /// The scenario file whose text has still to be laid into `env.scenario`, if the map is one.
     #[must_use]
@@ -83,6 +100,15 @@ impl EnvironmentConfig {
     #[must_use]
     pub fn is_matrix_game(&self) -> bool {
         self.scenario.is_empty() && self.map == MATRIX_GAME
+    }
+
+    /// The same world, played by the built-in simulator: its sizes are those of the game's.
+    #[must_use]
+    pub fn simulated(&self) -> Self {
+        Self {
+            engine: Engine::Simulator,
+            ..self.clone()
+        }
     }
 
     /// Builds the world in the built-in simulator.
@@ -136,21 +162,6 @@ impl EnvironmentConfig {
         self.validate_with(|_| Origin::Unknown)
     }
 
-    /// Checks the matrix game's settings, whose ranges hold whichever map is played.
-    fn validate_matrix_game(&self, origin_of: &impl Fn(&str) -> Origin) -> Result<(), ConfigError> {
-        let p = self.matrix_game.common_knowledge;
-        if (0.0..=1.0).contains(&p) {
-            return Ok(());
-        }
-        let key = "env.matrix_game.common_knowledge";
-        Err(ConfigError::WrongValue {
-            origin: origin_of(key),
-            key: key.to_owned(),
-            found: p.to_string(),
-            expected: "a number in [0, 1]".to_owned(),
-        })
-    }
-
     /// Checks the map's name, or the scenario that takes its place.
     fn validate_map(&self, origin_of: &impl Fn(&str) -> Origin) -> Result<(), ConfigError> {
         if let Some(file) = self.missing_scenario() {
@@ -174,45 +185,48 @@ impl EnvironmentConfig {
             })
     }
 
-    /// The dotted keys of the maps' settings.
-    pub(super) fn map_keys() -> Vec<String> {
-        let skirmish = keys_of(&SkirmishSettings::default());
-        let matrix_game = keys_of(&MatrixGameSettings::default());
-        let skirmish = skirmish.into_iter().map(|name| format!("env.{name}"));
-        let matrix_game = matrix_game.into_iter();
-        skirmish
-            .chain(matrix_game.map(|name| format!("env.matrix_game.{name}")))
-            .collect()
-    }
-
     /// Checks the map's name and the ranges of its settings.
     pub(super) fn validate_with(
         &self,
         origin_of: impl Fn(&str) -> Origin,
     ) -> Result<(), ConfigError> {
-        self.settings.validate().map_err(|error| match error {
-            SkirmishError::Setting {
-                key,
-                found,
-                expected,
-            } => ConfigError::WrongValue {
-                origin: origin_of(&format!("env.{key}")),
-                key: format!("env.{key}"),
-                found,
-                expected: format!("a value {expected}"),
-            },
-            other => ConfigError::Syntax {
-                origin: origin_of("env.map"),
-                message: other.to_string(),
-            },
-        })?;
-        self.validate_matrix_game(&origin_of)?;
+        for (section, violation) in [
+            ("env", self.settings.violation()),
+            ("env.matrix_game", self.matrix_game.violation()),
+        ] {
+            if let Some(violation) = violation {
+                return Err(ConfigError::violation(section, violation, origin_of));
+            }
+        }
+        self.validate_ranges(&origin_of)?;
         self.validate_map(&origin_of)
     }
-}
 
-/// The names of built-in settings.
-fn keys_of(settings: &impl Serialize) -> Vec<String> {
-    let table = toml::Table::try_from(settings).expect("built-in settings are a table");
-    table.keys().cloned().collect()
+    fn validate_ranges(&self, origin_of: &impl Fn(&str) -> Origin) -> Result<(), ConfigError> {
+        if self.settings.aims_within_sight() {
+            return Ok(());
+        }
+        let SkirmishSettings {
+            shoot_range: shoot,
+            sight_range: sight,
+            ..
+        } = self.settings;
+        Err(ConfigError::at_odds(
+            origin_of,
+            (
+                "env.shoot_range",
+                format!("{shoot:?}"),
+                format!(
+                    "less than {sight:?}, which is env.sight_range: agents can only aim at what they see"
+                ),
+            ),
+            (
+                "env.sight_range",
+                format!("{sight:?}"),
+                format!(
+                    "more than {shoot:?}, which is env.shoot_range: agents can only aim at what they see"
+                ),
+            ),
+        ))
+    }
 }

@@ -2,9 +2,10 @@
 
 use std::fmt;
 
+use mackrl_env::settings::Violation;
 use thiserror::Error;
 
-/// Where a value was written.
+/// Where a value was written; later layers are greater.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Origin {
@@ -120,6 +121,42 @@ pub enum ConfigError {
 }
 
 impl ConfigError {
+    /// The error for a value that the setting in this section does not take.
+    pub(super) fn violation(
+        section: &str,
+        violation: Violation,
+        origin_of: impl Fn(&str) -> Origin,
+    ) -> Self {
+        let key = format!("{section}.{}", violation.name);
+        Self::WrongValue {
+            origin: origin_of(&key),
+            key,
+            found: violation.found,
+            expected: violation.accepts.to_string(),
+        }
+    }
+
+    /// The error for two values that do not go together, each given as key, value and what is expected beside the other: it
+    /// names the one that was written later.
+    pub(super) fn at_odds(
+        origin_of: &impl Fn(&str) -> Origin,
+        one: (&str, String, String),
+        other: (&str, String, String),
+    ) -> Self {
+        let later = if origin_of(other.0) > origin_of(one.0) {
+            other
+        } else {
+            one
+        };
+        let (key, found, expected) = later;
+        Self::WrongValue {
+            origin: origin_of(key),
+            key: key.to_owned(),
+            found,
+            expected,
+        }
+    }
+
     /// The error for a map `name` that is not among the `known` ones.
     #[must_use]
     pub fn unknown_map<'a>(
@@ -129,7 +166,7 @@ impl ConfigError {
     ) -> Self {
         Self::UnknownMap {
             origin,
-            name: name.to_owned(),
+            name: shortened(name),
             nearest: nearest(name, known),
         }
     }
@@ -139,6 +176,17 @@ impl From<ConfigError> for crate::Error {
     fn from(error: ConfigError) -> Self {
         Self::Config(error.to_string())
     }
+}
+
+/// What somebody wrote, fit for a message: no longer than a line.
+pub(super) fn shortened(text: &str) -> String {
+    const LENGTH_MAX: usize = 80;
+    let mut characters = text.chars();
+    let mut short: String = characters.by_ref().take(LENGTH_MAX).collect();
+    if characters.next().is_some() {
+        short.push('…');
+    }
+    short
 }
 
 fn suggestion(nearest: Option<&str>) -> String {
@@ -151,6 +199,11 @@ fn suggestion(nearest: Option<&str>) -> String {
 #[must_use]
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
     const SIMILAR: f64 = 0.6;
+    /// Longer than any name; comparing takes time and memory proportional to the length.
+    const LENGTH_MAX: usize = 100;
+    if name.len() > LENGTH_MAX {
+        return None;
+    }
     let last = |key: &str| key.rsplit('.').next().unwrap_or_default().to_owned();
     let similarity = |candidate: &str| {
         let whole = strsim::normalized_damerau_levenshtein(name, candidate);
@@ -189,6 +242,14 @@ mod tests {
     #[test]
     fn one_slip_in_a_short_name_is_forgiven() {
         assert_eq!(nearest("3n", ["8m", "3m", "2s3z"]).as_deref(), Some("3m"));
+    }
+
+    #[test]
+    fn what_is_endless_is_shortened_and_not_compared() {
+        let endless = "gamma".repeat(1000);
+        assert_eq!(nearest(&endless, KEYS), None);
+        assert_eq!(shortened(&endless).chars().count(), 81);
+        assert_eq!(shortened("gamma"), "gamma");
     }
 
     #[test]

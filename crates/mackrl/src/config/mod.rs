@@ -11,8 +11,8 @@
 //! can show the origin of every value. The alternative, merging the layers as text or as untyped tables and deserialising
 //! once at the end, is shorter, but its errors cannot say where a value was written.
 //!
-//! A setting is declared once, in `sections.rs`: its name, type, built-in value, accepted range and meaning. Checks, error
-//! messages, name suggestions and `mackrl config --print` all read that declaration.
+//! A setting is declared once, in `sections.rs`, or with the world that it belongs to: its name, type, built-in value, accepted
+//! values and meaning. Checks, error messages, name suggestions, explanations and the JSON schema all read that declaration.
 //!
 //! The number of threads is not part of a configuration, because it changes no result.
 
@@ -22,6 +22,7 @@ mod document;
 mod environment;
 mod error;
 mod presets;
+mod schema;
 mod sections;
 mod settings;
 
@@ -31,6 +32,7 @@ pub use document::{Leaf, SyntaxError, line_and_column, parse_document};
 pub use environment::EnvironmentConfig;
 pub use error::{ConfigError, Origin, nearest};
 pub use presets::{Preset, presets};
+pub use schema::schema;
 pub use sections::{Config, ExplorationConfig, LearnerConfig, PolicyConfig, RunConfig, TestConfig};
 pub use settings::Setting;
 

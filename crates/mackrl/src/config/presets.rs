@@ -1,6 +1,6 @@
 //! The shipped presets: complete, commented configurations.
 
-use crate::config::{ConfigError, error::nearest};
+use crate::config::{ConfigError, document::parse_document, error::nearest};
 
 /// A shipped configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,6 +31,16 @@ pub const fn presets() -> &'static [Preset] {
 }
 
 impl Preset {
+    /// What the file says behind the value of the setting `key`: why it is so, and where the paper says it.
+    #[must_use]
+    pub fn remark(&self, key: &str) -> Option<&'static str> {
+        let leaves = parse_document(self.text).ok()?;
+        let leaf = leaves.iter().find(|leaf| leaf.path.join(".") == key)?;
+        let line = self.text.get(leaf.value_at..)?.lines().next()?;
+        let (_, remark) = line.split_once('#')?;
+        Some(remark.trim())
+    }
+
     /// The preset called `name`.
     ///
     /// # Errors
@@ -60,11 +70,12 @@ mod tests {
         for preset in presets() {
             let builder = ConfigBuilder::new().preset(preset.name).unwrap();
             builder.build().unwrap();
-            // A scenario of one's own is no business of a preset's.
+            // A preset goes with any world, and changes of worlds what the paper's code changes.
             let settings = Config::settings().into_iter();
-            for setting in settings.filter(|setting| setting.key != "env.scenario") {
+            let chosen_by_presets = |key: &str| key == "env.map" || !key.starts_with("env.");
+            for setting in settings.filter(|setting| chosen_by_presets(&setting.key)) {
                 assert_ne!(
-                    builder.origin(setting.key),
+                    builder.origin(&setting.key),
                     Origin::BuiltIn,
                     "preset {} leaves {} out",
                     preset.name,
@@ -78,6 +89,13 @@ mod tests {
     fn the_default_preset_is_what_is_built_in() {
         let preset = ConfigBuilder::new().preset("default").unwrap();
         assert_eq!(preset.build().unwrap(), Config::default());
+    }
+
+    #[test]
+    fn a_preset_says_where_the_paper_says_so() {
+        let paper = Preset::named("paper").unwrap();
+        assert_eq!(paper.remark("learner.lambda"), Some("\"TD-lambda of 0.8\""));
+        assert_eq!(paper.remark("learner.lambd"), None);
     }
 
     #[test]

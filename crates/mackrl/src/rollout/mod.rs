@@ -7,6 +7,8 @@
 mod episode;
 mod shard;
 
+use std::sync::{Arc, atomic::AtomicBool};
+
 use mackrl_env::{Environment, EpisodeKey};
 
 pub use episode::Episode;
@@ -58,6 +60,13 @@ impl Rollout {
         Self { shards, threads }
     }
 
+    /// Gives up playing, between two steps, as soon as `stop` is set.
+    pub fn stop_when(&mut self, stop: &Arc<AtomicBool>) {
+        self.shards
+            .iter_mut()
+            .for_each(|shard| shard.stop_when(stop));
+    }
+
     /// B: the number of episodes that are played at once.
     #[must_use]
     pub fn environments(&self) -> usize {
@@ -67,7 +76,7 @@ impl Rollout {
     /// Plays the episodes named `keys`, at most B, to their ends.
     ///
     /// # Errors
-    /// If an environment refuses an action, or a number is not finite; the first shard's error is given.
+    /// If an environment refuses an action, or a number is not finite, or [`Error::Stopped`]; the first shard's error is given.
     ///
     /// # Panics
     /// If there are more keys than environments.

@@ -1,6 +1,12 @@
 //! A shard: a few environments, the actor that plays in them, and the episodes that come out.
 
-use std::fmt;
+use std::{
+    fmt,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+};
 
 use mackrl_env::{Action, Environment, EpisodeKey, Observations, StepError};
 
@@ -26,6 +32,8 @@ pub struct Shard {
     actions_bn: Vec<Action>,
     agents: usize,
     batch: ShardBatch,
+    /// Whether to give up: episodes of large teams last seconds.
+    stop: Arc<AtomicBool>,
     /// Episodes that were played in vain.
     discarded: u64,
 }
@@ -52,8 +60,14 @@ impl Shard {
                 episodes: Vec::new(),
                 actor,
             },
+            stop: Arc::default(),
             discarded: 0,
         }
+    }
+
+    /// Gives episodes up, between two steps, as soon as `stop` is set.
+    pub fn stop_when(&mut self, stop: &Arc<AtomicBool>) {
+        self.stop = Arc::clone(stop);
     }
 
     /// Number of environments.
@@ -80,7 +94,8 @@ impl Shard {
     ///
     /// # Errors
     /// If an environment refuses an action, which means that the policy's masks disagree with it, or cannot be played in any
-    /// more, or if something that an environment or a controller gives is not finite.
+    /// more, or if something that an environment or a controller gives is not finite; [`Error::Stopped`] if asked to
+    /// stop.
     pub fn play(
         &mut self,
         weights: &Weights,
@@ -119,6 +134,9 @@ impl Shard {
         for step in 0.. {
             if playing.is_empty() {
                 break;
+            }
+            if self.stop.load(Ordering::Relaxed) {
+                return Err(Error::Stopped);
             }
             let situation = Situation {
                 step,

@@ -135,6 +135,23 @@ pub fn policy(config: &Config, world: &World) -> Result<Box<dyn Decentralised>, 
     }
 }
 
+/// Bytes that no file of weights or of a checkpoint's tensors exceeds in a run that `config` describes: whoever reads one that
+/// somebody else wrote needs to read no further.
+///
+/// # Errors
+/// As [`World::new`] and [`policy`].
+pub fn tensors_bytes_max(config: &Config) -> Result<usize, Error> {
+    const HEADER: usize = 1 << 20;
+    /// Parameters, a target copy and two moments.
+    const COPIES: usize = 4;
+    let mut config = config.clone();
+    config.env = config.env.simulated();
+    let world = World::new(&config)?;
+    let critic = config.policy.hidden * (world.spec().state_size + 8);
+    let parameters = policy(&config, &world)?.layout().len() + critic;
+    Ok(HEADER + COPIES * parameters * size_of::<f32>())
+}
+
 /// How the learner learns.
 #[must_use]
 pub fn learner(config: &Config) -> LearnerSettings {

@@ -1,5 +1,7 @@
 //! Greedy episodes with fixed weights.
 
+use std::sync::{Arc, atomic::AtomicBool};
+
 use mackrl_env::{EpisodeKey, Stream};
 use serde::{Deserialize, Serialize};
 
@@ -118,6 +120,11 @@ impl Evaluator {
         Ok(Self {
             rollout: Rollout::new(policy, environments, SHARD_SIZE, threads),
         })
+    }
+
+    /// Gives up playing as soon as `stop` is set.
+    pub(super) fn stop_when(&mut self, stop: &Arc<AtomicBool>) {
+        self.rollout.stop_when(stop);
     }
 
     /// Episodes that were played in vain because a world failed.

@@ -1,6 +1,9 @@
 //! The training loop: a batch of episodes, an update, now and then a test.
 
-use std::time::Instant;
+use std::{
+    sync::{Arc, atomic::AtomicBool},
+    time::Instant,
+};
 
 use mackrl_env::{EpisodeKey, Stream};
 
@@ -9,7 +12,7 @@ use super::{
     checkpoint::{Counters, Layouts, State},
     evaluation::Evaluator,
     experience::ExperienceHash,
-    write_weights,
+    read_weights, write_weights,
 };
 use crate::{
     Error, Moment, Phase, Stopwatch,
@@ -91,6 +94,31 @@ impl Trainer {
         })
     }
 
+    /// As [`Self::in_world`], continued where `checkpoint` was taken; see [`Self::restore`]. Nothing large is made before it is
+    /// known that the checkpoint holds a policy of the configured size, because both may be a stranger's.
+    ///
+    /// # Errors
+    /// As [`Self::in_world`] and [`Self::restore`].
+    pub fn resumed(
+        config: &Config,
+        world: &assembly::World,
+        threads: usize,
+        checkpoint: &Checkpoint,
+    ) -> Result<Self, Error> {
+        let policy = assembly::policy(config, world)?;
+        read_weights(policy.layout(), &checkpoint.tensors)?;
+        let mut trainer = Self::in_world(config, world, threads)?;
+        trainer.restore(checkpoint)?;
+        Ok(trainer)
+    }
+
+    /// Lets [`Self::update`] give up, with [`Error::Stopped`], as soon as `stop` is set: episodes of large teams, and long tests,
+    /// last longer than somebody who wants to stop should wait.
+    pub fn stop_when(&mut self, stop: &Arc<AtomicBool>) {
+        self.rollout.stop_when(stop);
+        self.evaluator.stop_when(stop);
+    }
+
     /// Environment steps so far, summed over the parallel environments.
     #[must_use]
     pub const fn steps_env(&self) -> u64 {
@@ -108,8 +136,8 @@ impl Trainer {
     ///
     /// # Errors
     /// [`Error::NotFinite`] if a number is not finite: one that an environment gives, a logit, a number of the critic's, a
-    /// gradient, a moment or a parameter after the step. [`Error::Step`] if a world cannot be played in any more. The trainer
-    /// is as it was before then.
+    /// gradient, a moment or a parameter after the step. [`Error::Step`] if a world cannot be played in any more,
+    /// [`Error::Stopped`] if asked to stop. The trainer is as it was before then, and can make the same update again.
     pub fn update(&mut self) -> Result<Option<MetricRow>, Error> {
         if self.is_test_due() {
             return self.test().map(Some);
@@ -404,6 +432,29 @@ impl std::fmt::Debug for Trainer {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_update_that_is_given_up_leaves_no_trace() {
+        let mut config = Config::default();
+        config.policy.hidden = 3;
+        config.learner.environments = 2;
+        config.test.episodes = 2;
+        let mut trainer = Trainer::new(&config, 1).unwrap();
+        let stop = Arc::default();
+        trainer.stop_when(&stop);
+        let mut undisturbed = Trainer::new(&config, 1).unwrap();
+        // A test, and two updates.
+        for _ in 0..3 {
+            stop.store(true, std::sync::atomic::Ordering::Relaxed);
+            let before = trainer.checkpoint();
+            assert!(matches!(trainer.update(), Err(Error::Stopped)));
+            assert!(trainer.checkpoint() == before);
+            stop.store(false, std::sync::atomic::Ordering::Relaxed);
+            trainer.update().unwrap();
+            undisturbed.update().unwrap();
+            assert!(trainer.checkpoint() == undisturbed.checkpoint());
+        }
+    }
 
     #[test]
     fn exploration_falls_linearly_and_then_stays() {

@@ -2,7 +2,10 @@
 
 use safetensors::{Dtype, SafeTensors, tensor::TensorView};
 
-use crate::{Error, nn::ParameterLayout};
+use crate::{
+    Error,
+    nn::{ParameterLayout, TensorSpec},
+};
 
 /// Serialises the tensors of several models side by side.
 ///
@@ -36,31 +39,43 @@ pub fn write_weights(models: &[(&ParameterLayout, &[f32])]) -> Vec<u8> {
 pub fn read_weights(layout: &ParameterLayout, file: &[u8]) -> Result<Vec<f32>, Error> {
     let tensors = SafeTensors::deserialize(file)
         .map_err(|error| Error::Data(format!("weights are no safetensors file: {error}")))?;
+    // Nothing is allocated for a model before it is known that the file holds one of its size.
+    let views = layout
+        .tensors()
+        .iter()
+        .map(|tensor| Ok((tensor, view(&tensors, tensor)?)))
+        .collect::<Result<Vec<_>, Error>>()?;
     let mut parameters = vec![0.0; layout.len()];
-    for tensor in layout.tensors() {
-        let name = &tensor.name;
-        let view = tensors
-            .tensor(name)
-            .map_err(|_| Error::Data(format!("weights have no tensor `{name}`")))?;
-        if view.dtype() != Dtype::F32 || view.shape() != tensor.shape {
-            return Err(Error::Data(format!(
-                "tensor `{name}` is {:?} of shape {:?}, expected F32 of shape {:?}",
-                view.dtype(),
-                view.shape(),
-                tensor.shape
-            )));
-        }
+    for (tensor, view) in views {
         let values = view.data().as_chunks::<4>().0;
         for (parameter, bytes) in parameters[tensor.range.clone()].iter_mut().zip(values) {
             *parameter = f32::from_le_bytes(*bytes);
             if !parameter.is_finite() {
                 return Err(Error::Data(format!(
-                    "tensor `{name}` holds {parameter}, expected finite numbers"
+                    "tensor `{}` holds {parameter}, expected finite numbers",
+                    tensor.name
                 )));
             }
         }
     }
     Ok(layout.from_pytorch(&parameters))
+}
+
+/// The tensor in the file that has this name, type and shape.
+fn view<'a>(tensors: &SafeTensors<'a>, tensor: &TensorSpec) -> Result<TensorView<'a>, Error> {
+    let name = &tensor.name;
+    let view = tensors
+        .tensor(name)
+        .map_err(|_| Error::Data(format!("weights have no tensor `{name}`")))?;
+    if view.dtype() != Dtype::F32 || view.shape() != tensor.shape {
+        return Err(Error::Data(format!(
+            "tensor `{name}` is {:?} of shape {:?}, expected F32 of shape {:?}",
+            view.dtype(),
+            view.shape(),
+            tensor.shape
+        )));
+    }
+    Ok(view)
 }
 
 #[cfg(test)]

@@ -108,7 +108,7 @@ fn settings(a: &Config, b: &Config) -> Vec<Differing> {
             serde_json::to_value(value).unwrap_or_default()
         })
     };
-    let keys = Config::keys().into_iter();
+    let keys = Config::keys();
     keys.map(|key| {
         let (a, b) = (value(a, &key), value(b, &key));
         Differing::new(key, a, b)

@@ -101,7 +101,7 @@ impl Player {
     ) -> anyhow::Result<Self> {
         let environment = worlds.make(map)?;
         // Scripts know a map by its skirmish, whoever plays it.
-        let team = ScriptedTeam::new(policy, &sc2::simulated(map).skirmish()?);
+        let team = ScriptedTeam::new(policy, &map.simulated().skirmish()?);
         Ok(Self {
             team,
             observations: Observations::new(environment.spec(), 1),

@@ -8,7 +8,7 @@ use mackrl_env::{
 };
 use mackrl_sc2::adapter::StarCraft2;
 
-use super::worlds::{StarCraftWorlds, simulated};
+use super::worlds::StarCraftWorlds;
 use crate::{args::PlayArgs, output};
 
 /// Plays one episode, writes the game's replay, and says how it went.
@@ -60,7 +60,7 @@ pub(super) fn play(
     policy: ScriptedPolicy,
     key: EpisodeKey,
 ) -> anyhow::Result<usize> {
-    let mut team = ScriptedTeam::new(policy, &simulated(map).skirmish()?);
+    let mut team = ScriptedTeam::new(policy, &map.simulated().skirmish()?);
     loop {
         match attempt(environment, &mut team, key) {
             Err(StepError::Interrupted(failure)) if failure.can_be_repeated => {}

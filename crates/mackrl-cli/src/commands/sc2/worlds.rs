@@ -39,14 +39,6 @@ pub(crate) fn worlds(map: &EnvironmentConfig) -> Box<dyn WorldSource> {
     }
 }
 
-/// The same map in the built-in simulator.
-pub(crate) fn simulated(map: &EnvironmentConfig) -> EnvironmentConfig {
-    EnvironmentConfig {
-        engine: Engine::Simulator,
-        ..map.clone()
-    }
-}
-
 /// Maps of StarCraft II, in games that are started when they are needed and shared by all worlds.
 #[derive(Debug)]
 pub(super) struct StarCraftWorlds {

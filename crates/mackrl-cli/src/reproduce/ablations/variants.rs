@@ -106,7 +106,7 @@ mod tests {
                     .try_fold(base.clone(), |builder, setting| builder.set(setting))
                     .unwrap();
                 let changed = changed.build().unwrap();
-                let differing = Config::keys().into_iter();
+                let differing = Config::keys();
                 let differing = differing.filter(|key| changed.get(key) != config.get(key));
                 assert_eq!(differing.count(), 1, "{} of {}", variant.name, preset.name);
             }

@@ -6,9 +6,9 @@ use serde::Deserialize;
 
 use crate::{
     config::{
-        Config, ConfigError, Origin, PartitionChoice, Preset,
+        Config, ConfigError, EnvironmentConfig, Origin, PartitionChoice, Preset,
         document::{Leaf, SyntaxError, line_and_column, parse_assignment, parse_document},
-        error::nearest,
+        error::shortened,
     },
     partition::PartitionSchedule,
 };
@@ -91,7 +91,7 @@ impl ConfigBuilder {
     /// As [`ConfigBuilder::set`]; the error names `typed`.
     pub fn flag(self, typed: &str, assignment: &str) -> Result<Self, ConfigError> {
         let origin = Origin::CommandLine {
-            text: typed.to_owned(),
+            text: shortened(typed),
         };
         self.assign(origin, assignment)
     }
@@ -130,7 +130,7 @@ impl ConfigBuilder {
         self
     }
 
-    /// Checks ranges and gives the configuration.
+    /// Checks ranges and combinations, and gives the configuration.
     ///
     /// # Errors
     /// If a value is out of its range or does not go with another.
@@ -138,13 +138,29 @@ impl ConfigBuilder {
     /// # Panics
     /// Never: every value is checked when it is laid.
     pub fn build(&self) -> Result<Config, ConfigError> {
-        let mut config = Config::deserialize(self.table.clone())
-            .expect("every value was checked when it was laid");
+        let mut config = self.unchecked();
         config.validate_with(|key| self.written(key))?;
         if let Some(partitions) = self.automatic_partitions() {
             config.policy.partitions = partitions;
         }
         Ok(config)
+    }
+
+    /// As [`ConfigBuilder::build`], for those who need the world alone: nobody has to be able to learn in it.
+    ///
+    /// # Errors
+    /// If a setting of the world is out of its range or does not go with another.
+    ///
+    /// # Panics
+    /// Never: every value is checked when it is laid.
+    pub fn build_environment(&self) -> Result<EnvironmentConfig, ConfigError> {
+        let Config { env, .. } = self.unchecked();
+        env.validate_with(|key| self.written(key))?;
+        Ok(env)
+    }
+
+    fn unchecked(&self) -> Config {
+        Config::deserialize(self.table.clone()).expect("every value was checked when it was laid")
     }
 
     /// Where the value at `key` comes from.
@@ -202,22 +218,14 @@ impl ConfigBuilder {
     /// Lays one value; the table stays deserialisable, so a failure is this value's.
     fn lay(&mut self, leaf: Leaf, key_at: Origin, value_at: Origin) -> Result<(), ConfigError> {
         let key = leaf.path.join(".");
-        let keys = Config::keys();
-        let section = format!("{key}.");
-        if !keys.contains(&key) && !keys.iter().any(|other| other.starts_with(&section)) {
-            return Err(ConfigError::UnknownKey {
-                origin: key_at,
-                nearest: nearest(&key, keys.iter().map(String::as_str)),
-                key,
-            });
-        }
-        let found = leaf.value.to_string();
+        Config::settings_called(&key, key_at)?;
+        let found = shortened(&leaf.value.to_string());
         let mut table = self.table.clone();
         insert(&mut table, &leaf.path, leaf.value);
         if let Err(error) = Config::deserialize(table.clone()) {
             return Err(ConfigError::WrongValue {
                 origin: value_at,
-                expected: expectation(&key, error.message()),
+                expected: expectation(&key, &error),
                 key,
                 found,
             });
@@ -228,21 +236,13 @@ impl ConfigBuilder {
     }
 }
 
-/// What is expected at `key`, where a value failed to be read with `message`.
-fn expectation(key: &str, message: &str) -> String {
+/// What is expected at `key`, whose value could not be read because of `error`.
+fn expectation(key: &str, error: &toml::de::Error) -> String {
     let settings = Config::settings();
-    if let Some(setting) = settings.iter().find(|setting| setting.key == key) {
-        return setting.expects.to_owned();
-    }
-    match Config::default().get(key) {
-        Some(toml::Value::Float(_)) => "a number".to_owned(),
-        Some(toml::Value::Integer(_)) => "an integer in [0, 255]".to_owned(),
-        Some(toml::Value::Boolean(_)) => "`true` or `false`".to_owned(),
-        Some(toml::Value::Table(_)) => "a table of settings".to_owned(),
-        _ => match message.split_once("expected ") {
-            Some((_, expected)) => expected.to_owned(),
-            None => message.to_owned(),
-        },
+    match settings.iter().find(|setting| setting.key == key) {
+        Some(setting) => setting.accepts.to_string(),
+        None if Config::default().get(key).is_some() => "a table of settings".to_owned(),
+        None => error.message().to_owned(),
     }
 }
 

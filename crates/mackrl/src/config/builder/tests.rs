@@ -94,7 +94,7 @@ fn a_value_out_of_range_is_named_with_its_place() {
     );
     assert_eq!(
         message(built("exploration.finish = 0.9")),
-        "run.toml:1:22: `exploration.finish` is 0.9, expected a number in [0, exploration.start]"
+        "run.toml:1:22: `exploration.finish` is 0.9, expected at most 0.5, which is exploration.start"
     );
 }
 
@@ -164,18 +164,49 @@ fn a_setting_of_the_map_that_is_wrong_is_named_like_any_other() {
     );
     assert_eq!(
         message(file("[env]\nmove_amount = \"far\"\n")),
-        "run.toml:2:15: `env.move_amount` is \"far\", expected a number"
+        "run.toml:2:15: `env.move_amount` is \"far\", expected a number in (0, 32]"
     );
     assert_eq!(
         message(file("[env]\nmove_amount = 99.0\n").unwrap().build()),
-        "run.toml:2:15: `env.move_amount` is 99, expected a value in (0, 32]"
+        "run.toml:2:15: `env.move_amount` is 99.0, expected a number in (0, 32]"
     );
-    let unknown_units = message(ConfigBuilder::new().set("env.units=paper"));
-    assert!(
-        unknown_units
-            .starts_with("--set env.units=paper: `env.units` is \"paper\", expected `liberty`"),
-        "{unknown_units}"
+    assert_eq!(
+        message(ConfigBuilder::new().set("env.units=paper")),
+        "--set env.units=paper: `env.units` is \"paper\", expected `liberty` or `lotv`"
     );
+    assert_eq!(
+        message(file("[env]\nshoot_range = 9.0\n").unwrap().build()),
+        "run.toml:2:15: `env.shoot_range` is 9.0, expected less than 9.0, which is env.sight_range: agents can only aim at what they see"
+    );
+    assert_eq!(
+        message(
+            ConfigBuilder::new()
+                .set("env.sight_range=6.0")
+                .unwrap()
+                .build()
+        ),
+        "--set env.sight_range=6.0: `env.sight_range` is 6.0, expected more than 6.0, which is env.shoot_range: agents can only aim at what they see",
+        "the value that was written later is named"
+    );
+}
+
+#[test]
+fn a_team_without_the_partitions_that_are_asked_for_is_named_with_its_place() {
+    let large = file("[env]\nmap = \"27m_vs_30m\"\n[policy]\npartitions = \"all\"\n").unwrap();
+    assert_eq!(
+        message(large.build()),
+        "run.toml:4:14: `policy.partitions` is \"all\", expected `round-robin` or `sampled:K` for the 27 agents of 27m_vs_30m"
+    );
+    assert_eq!(
+        large.build_environment().unwrap().map,
+        "27m_vs_30m",
+        "the world alone can be had"
+    );
+    large
+        .set("policy.algorithm=central-v")
+        .unwrap()
+        .build()
+        .unwrap();
 }
 
 #[test]
@@ -186,11 +217,11 @@ fn an_unknown_map_is_named_with_its_place_and_its_neighbour() {
     );
 }
 
+/// Choices that every team has.
 fn choice() -> impl Strategy<Value = PartitionChoice> {
     prop_oneof![
-        Just(PartitionChoice::All),
         Just(PartitionChoice::RoundRobin),
-        (1usize..99).prop_map(PartitionChoice::Sampled),
+        Just(PartitionChoice::Sampled(1)),
     ]
 }
 
@@ -223,6 +254,8 @@ prop_compose! {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
+
     #[test]
     fn a_configuration_is_read_as_it_was_written(config in any_config()) {
         prop_assert_eq!(config.validate(), Ok(()));

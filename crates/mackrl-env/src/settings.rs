@@ -1,0 +1,304 @@
+//! Declaring settings: name, type, built-in value, accepted values and meaning, once and together.
+//!
+//! Whoever checks a value, explains it or describes it to a machine (a JSON schema) reads the same declaration. The
+//! alternative, a predicate beside a sentence that describes it, is shorter to write, and the two drift apart.
+
+use std::{
+    fmt,
+    ops::Bound::{self, Excluded, Included, Unbounded},
+};
+
+use serde::Serialize;
+
+/// 2⁵³: up to here every reader of TOML and JSON keeps integers exactly, those that hold them as f64 included.
+pub const EXACT: u64 = 1 << 53;
+
+/// Which values a setting takes; shown in words that follow "expected".
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum Accepts {
+    /// `true` or `false`.
+    Flag,
+    /// An integer in [least, greatest].
+    Integer {
+        /// The least.
+        least: u64,
+        /// The greatest.
+        greatest: u64,
+    },
+    /// A finite number between two bounds.
+    Number {
+        /// From below.
+        least: Bound<f64>,
+        /// From above.
+        greatest: Bound<f64>,
+    },
+    /// One of a few words.
+    OneOf(&'static [&'static str]),
+    /// Text that its own reader checks.
+    Text {
+        /// Which, in words that follow "expected".
+        expects: &'static str,
+        /// The same as a regular expression, if there is one.
+        pattern: Option<&'static str>,
+    },
+}
+
+impl Accepts {
+    /// Integers in [least, greatest].
+    #[must_use]
+    pub const fn integer(least: u64, greatest: u64) -> Self {
+        Self::Integer { least, greatest }
+    }
+
+    /// Numbers in [least, greatest].
+    #[must_use]
+    pub const fn within(least: f64, greatest: f64) -> Self {
+        Self::Number {
+            least: Included(least),
+            greatest: Included(greatest),
+        }
+    }
+
+    /// Numbers in (least, greatest].
+    #[must_use]
+    pub const fn above_within(least: f64, greatest: f64) -> Self {
+        Self::Number {
+            least: Excluded(least),
+            greatest: Included(greatest),
+        }
+    }
+
+    /// Finite numbers greater than this.
+    #[must_use]
+    pub const fn above(least: f64) -> Self {
+        Self::Number {
+            least: Excluded(least),
+            greatest: Unbounded,
+        }
+    }
+
+    /// Whether this is one of the values. Text is checked by its own reader.
+    #[must_use]
+    pub fn admits(&self, value: &toml::Value) -> bool {
+        match (*self, value) {
+            (Self::Flag, toml::Value::Boolean(_)) | (Self::Text { .. }, toml::Value::String(_)) => {
+                true
+            }
+            (Self::Integer { least, greatest }, toml::Value::Integer(value)) => {
+                u64::try_from(*value).is_ok_and(|value| (least..=greatest).contains(&value))
+            }
+            (Self::Number { least, greatest }, toml::Value::Float(value)) => {
+                value.is_finite() && std::ops::RangeBounds::contains(&(least, greatest), value)
+            }
+            (Self::OneOf(words), toml::Value::String(value)) => words.contains(&value.as_str()),
+            _ => false,
+        }
+    }
+}
+
+impl fmt::Display for Accepts {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Flag => formatter.write_str("`true` or `false`"),
+            Self::Integer { least, greatest } => match *greatest {
+                EXACT => write!(formatter, "an integer in [{least}, 2^53]"),
+                greatest => write!(formatter, "an integer in [{least}, {greatest}]"),
+            },
+            Self::Number { least, greatest } => match (least, greatest) {
+                (Excluded(least), Unbounded) => write!(formatter, "a finite number > {least}"),
+                (Included(least), Unbounded) => write!(formatter, "a finite number >= {least}"),
+                _ => write!(
+                    formatter,
+                    "a number in {}, {}",
+                    opening(*least),
+                    closing(*greatest)
+                ),
+            },
+            Self::OneOf(words) => formatter.write_str(&alternatives(words)),
+            Self::Text { expects, .. } => formatter.write_str(expects),
+        }
+    }
+}
+
+fn opening(bound: Bound<f64>) -> String {
+    match bound {
+        Included(least) => format!("[{}", short(least)),
+        Excluded(least) => format!("({}", short(least)),
+        Unbounded => "(-∞".to_owned(),
+    }
+}
+
+fn closing(bound: Bound<f64>) -> String {
+    match bound {
+        Included(greatest) => format!("{}]", short(greatest)),
+        Excluded(greatest) => format!("{})", short(greatest)),
+        Unbounded => "∞)".to_owned(),
+    }
+}
+
+fn short(number: f64) -> String {
+    if number.abs() < 1e6 {
+        number.to_string()
+    } else {
+        format!("{number:e}")
+    }
+}
+
+/// "`a`, `b` or `c`"
+fn alternatives(words: &[&str]) -> String {
+    let quoted: Vec<String> = words.iter().map(|word| format!("`{word}`")).collect();
+    match quoted.split_last() {
+        Some((last, others)) if !others.is_empty() => format!("{} or {last}", others.join(", ")),
+        _ => quoted.concat(),
+    }
+}
+
+/// What is known about a setting besides its value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Setting {
+    /// Its name within its section.
+    pub name: &'static str,
+    /// What it means, with its unit: the documentation of its field.
+    pub meaning: &'static str,
+    /// Which values it takes.
+    pub accepts: Accepts,
+}
+
+impl Setting {
+    /// What is wrong with `value` as the value of this setting, if anything is.
+    #[must_use]
+    pub fn check(&self, value: &(impl Serialize + fmt::Debug)) -> Option<Violation> {
+        let found = match toml::Value::try_from(value) {
+            Ok(value) if self.accepts.admits(&value) => return None,
+            Ok(value) => value.to_string(),
+            // An integer that TOML cannot hold.
+            Err(_) => format!("{value:?}"),
+        };
+        Some(Violation {
+            name: self.name,
+            found,
+            accepts: self.accepts,
+        })
+    }
+}
+
+/// A value that its setting does not take.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Violation {
+    /// Name of the setting within its section.
+    pub name: &'static str,
+    /// The value.
+    pub found: String,
+    /// Which values it takes.
+    pub accepts: Accepts,
+}
+
+/// Declares a section of settings: the struct, its built-in values, what it accepts and what that means.
+///
+/// A field reads `name: type = built-in value, accepted values;`. The result is a plain struct with public fields that is
+/// read and written by its names and refuses others.
+#[macro_export]
+macro_rules! declare_settings {
+    (
+        $(#[$attribute:meta])*
+        pub struct $section:ident {
+            $( $(#[doc = $meaning:literal])+ $field:ident: $type:ty = $value:expr, $accepts:expr; )+
+        }
+    ) => {
+        $(#[$attribute])*
+        #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[serde(default, deny_unknown_fields)]
+        pub struct $section {
+            $(
+                $(#[doc = $meaning])+
+                #[doc = concat!("\n\nAccepts `", stringify!($accepts), "`; `", stringify!($value), "` unless set.")]
+                pub $field: $type,
+            )+
+        }
+
+        impl Default for $section {
+            fn default() -> Self {
+                Self { $($field: $value),+ }
+            }
+        }
+
+        impl $section {
+            /// Every setting of this section with its meaning and the values that it takes, in the order of declaration.
+            pub const SETTINGS: &'static [$crate::settings::Setting] = &[$(
+                $crate::settings::Setting {
+                    name: stringify!($field),
+                    meaning: concat!($($meaning),+).trim_ascii_start(),
+                    accepts: $accepts,
+                },
+            )+];
+
+            /// The first setting with a value that it does not take.
+            #[must_use]
+            pub fn violation(&self) -> Option<$crate::settings::Violation> {
+                let mut settings = Self::SETTINGS.iter();
+                $(
+                    let violation = settings.next().and_then(|setting| setting.check(&self.$field));
+                    if violation.is_some() {
+                        return violation;
+                    }
+                )+
+                None
+            }
+        }
+    };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn float(value: f64) -> toml::Value {
+        toml::Value::Float(value)
+    }
+
+    #[test]
+    fn bounds_are_in_or_out_as_they_are_written() {
+        let rate = Accepts::above_within(0.0, 1.0);
+        assert_eq!(rate.to_string(), "a number in (0, 1]");
+        assert!(rate.admits(&float(1.0)) && !rate.admits(&float(0.0)));
+        let share = Accepts::within(0.0, 1.0);
+        assert_eq!(share.to_string(), "a number in [0, 1]");
+        assert!(share.admits(&float(0.0)) && !share.admits(&float(1.5)));
+        let norm = Accepts::above(0.0);
+        assert_eq!(norm.to_string(), "a finite number > 0");
+        assert!(norm.admits(&float(1e300)) && !norm.admits(&float(0.0)));
+        let reward = Accepts::within(-1e9, 1e9);
+        assert_eq!(reward.to_string(), "a number in [-1e9, 1e9]");
+    }
+
+    #[test]
+    fn what_is_no_number_is_never_accepted() {
+        for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            assert!(!Accepts::above(0.0).admits(&float(value)), "{value}");
+            assert!(!Accepts::within(0.0, 1.0).admits(&float(value)), "{value}");
+        }
+    }
+
+    #[test]
+    fn integers_and_words_are_told_in_words() {
+        let seed = Accepts::integer(0, EXACT);
+        assert_eq!(seed.to_string(), "an integer in [0, 2^53]");
+        assert!(!seed.admits(&toml::Value::Integer(-1)));
+        let three = Accepts::OneOf(&["a", "b", "c"]);
+        assert_eq!(three.to_string(), "`a`, `b` or `c`");
+        assert!(!three.admits(&toml::Value::String("d".into())));
+    }
+
+    #[test]
+    fn an_integer_beyond_toml_is_refused_and_shown() {
+        let setting = Setting {
+            name: "seed",
+            meaning: "",
+            accepts: Accepts::integer(0, EXACT),
+        };
+        let violation = setting.check(&u64::MAX).unwrap();
+        assert_eq!(violation.found, u64::MAX.to_string());
+        assert_eq!(setting.check(&EXACT), None);
+    }
+}
