@@ -28,7 +28,7 @@ pub(crate) enum BenchCommand {
 /// Every step fills observations, state and action masks; nothing is learnt. With several threads, each plays its own
 /// environment. The best of five equal parts is reported too, because other work on the machine can only slow a part down.
 ///
-/// The JSON object has map, threads, steps, episodes, wall_s, env_steps_per_s and env_steps_per_s_best_part.
+/// The JSON object has `map`, `threads`, `steps`, `episodes`, `wall_s`, `env_steps_per_s` and `env_steps_per_s_best_part`.
 /// `benchmarks/simulator.sh` measures five maps on one thread and on two.
 ///
 /// Example: mackrl bench env --map 3m --steps 500000 --json

@@ -38,15 +38,22 @@ pub(crate) fn with_scenario(builder: ConfigBuilder) -> anyhow::Result<ConfigBuil
 
 /// Reads a scenario file, which may be anything: no more of it than a scenario may have.
 pub(crate) fn read_scenario(path: &Path) -> anyhow::Result<String> {
-    let text = bounded::read_text(path, LENGTH_MAX)?;
-    if text.is_empty() {
+    let bytes = bounded::read(path, LENGTH_MAX)?;
+    if bytes.is_empty() {
         let message = format!(
             "{}:1:1: found an empty file, expected a scenario",
             path.display()
         );
         return Err(ConfigError::Scenario { message }.into());
     }
-    Ok(text)
+    String::from_utf8(bytes).map_err(|error| {
+        let message = format!(
+            "{}: not UTF-8 text at byte {}",
+            path.display(),
+            error.utf8_error().valid_up_to()
+        );
+        ConfigError::Scenario { message }.into()
+    })
 }
 
 #[derive(Debug, Clone, Args)]

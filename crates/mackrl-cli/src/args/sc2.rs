@@ -12,9 +12,9 @@ use crate::args::PolicyChoice;
 /// doctor` says whether it is ready. The other way round, `mackrl sc2 install DIR` lays out a folder that SMAC's own client, PyMARL
 /// and others take for StarCraft II: with SC2PATH=DIR they run unchanged, on the simulator.
 ///
-/// The game is looked for in $SC2PATH, else in ~/StarCraftII. It is waited for: 60 s for an answer ($MACKRL_SC2_PATIENCE_S), 120 s
-/// for a start ($MACKRL_SC2_START_PATIENCE_S). After 10 failures of one environment without an episode that ended
-/// ($MACKRL_SC2_FAILURES) a run gives up.
+/// The game is looked for in $SC2PATH, else in `~/StarCraftII`. It is waited for: 60 s for an answer (`$MACKRL_SC2_PATIENCE_S`), 120 s
+/// for a start (`$MACKRL_SC2_START_PATIENCE_S`). After 10 failures of one environment without an episode that ended
+/// (`$MACKRL_SC2_FAILURES`) a run gives up.
 #[derive(Debug, Args)]
 pub(crate) struct Sc2Args {
     #[command(subcommand)]
@@ -124,7 +124,7 @@ pub(crate) struct ExecGameArgs {
 /// Holds a program that runs `mackrl sc2 serve`, a marker for each of SMAC's maps, and nothing of the game. A real game in the
 /// folder is left alone.
 ///
-/// Example: mackrl sc2 install ~/mackrl-sc2 && SC2PATH=~/mackrl-sc2 python my_smac_script.py
+/// Example: `mackrl sc2 install ~/mackrl-sc2 && SC2PATH=~/mackrl-sc2 python my_smac_script.py`
 #[derive(Debug, Args)]
 pub(crate) struct InstallArgs {
     /// Folder to lay out; created if missing

@@ -1,6 +1,11 @@
 //! `mackrl sc2 ps` and `mackrl sc2 kill`: games that this program started.
 
-use anyhow::Context;
+use std::{
+    thread,
+    time::{Duration, Instant},
+};
+
+use anyhow::{Context, bail};
 use mackrl_sc2::{
     adapter::process::{GameNote, running_games},
     lifetime,
@@ -11,6 +16,9 @@ use crate::{
     failure::Failure,
     output,
 };
+
+/// How long a killed process may take to end.
+const KILL_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Prints every running game.
 pub(super) fn list(args: &PsArgs) -> anyhow::Result<()> {
@@ -49,12 +57,26 @@ pub(super) fn kill(args: &KillArgs) -> anyhow::Result<()> {
         return Err(Failure::Usage { message }.into());
     }
     let chosen = |game: &&GameNote| args.pid.is_empty() || args.pid.contains(&game.pid);
-    let mut killed = 0;
-    for game in games.iter().filter(chosen) {
+    let chosen: Vec<&GameNote> = games.iter().filter(chosen).collect();
+    for game in &chosen {
         lifetime::kill(game.pid).with_context(|| format!("cannot kill process {}", game.pid))?;
-        killed += 1;
     }
-    output::print(&format!("killed: {killed}\n"))
+    for game in &chosen {
+        wait_for_end(game)?;
+    }
+    output::print(&format!("killed: {}\n", chosen.len()))
+}
+
+/// Waits until the kernel has taken a killed game away, so that nobody who looks afterwards finds it.
+fn wait_for_end(game: &GameNote) -> anyhow::Result<()> {
+    let deadline = Instant::now() + KILL_TIMEOUT;
+    while lifetime::is_running(game.pid, game.start) {
+        if Instant::now() > deadline {
+            bail!("process {} was killed but has not ended", game.pid);
+        }
+        thread::sleep(Duration::from_millis(5));
+    }
+    Ok(())
 }
 
 fn running() -> anyhow::Result<Vec<GameNote>> {

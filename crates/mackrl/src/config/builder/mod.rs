@@ -139,10 +139,10 @@ impl ConfigBuilder {
     /// Never: every value is checked when it is laid.
     pub fn build(&self) -> Result<Config, ConfigError> {
         let mut config = self.unchecked();
-        config.validate_with(|key| self.written(key))?;
         if let Some(partitions) = self.automatic_partitions() {
             config.policy.partitions = partitions;
         }
+        config.validate_with(|key| self.written(key))?;
         Ok(config)
     }
 
@@ -182,7 +182,7 @@ impl ConfigBuilder {
     /// The partitions of a team with too many to take all, unless somebody asked for particular ones: presets are written
     /// for small teams.
     fn automatic_partitions(&self) -> Option<PartitionChoice> {
-        let config = Config::deserialize(self.table.clone()).ok()?;
+        let config = self.unchecked();
         let was_asked = !matches!(
             self.written(PARTITIONS),
             Origin::BuiltIn | Origin::Preset { .. }
