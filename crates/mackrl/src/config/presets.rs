@@ -63,6 +63,8 @@ impl Preset {
 mod tests {
     use crate::config::{Config, ConfigBuilder, Origin};
 
+    use mackrl_env::skirmish::EnemyBehaviour;
+
     use super::*;
 
     #[test]
@@ -86,9 +88,11 @@ mod tests {
     }
 
     #[test]
-    fn the_default_preset_is_what_is_built_in() {
+    fn the_default_preset_is_what_is_built_in_but_for_enemies_that_seek() {
         let preset = ConfigBuilder::new().preset("default").unwrap();
-        assert_eq!(preset.build().unwrap(), Config::default());
+        let mut built_in = Config::default();
+        built_in.env.settings.enemy_order = EnemyBehaviour::Hunt;
+        assert_eq!(preset.build().unwrap(), built_in);
     }
 
     #[test]

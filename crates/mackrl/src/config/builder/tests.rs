@@ -289,8 +289,14 @@ fn large_teams_take_turns_unless_something_else_is_asked_for() {
     let (small, origin) = partitions(&["env.map=8m"]);
     assert_eq!(small, PartitionChoice::All);
     assert!(origin.starts_with("preset paper:"), "{origin}");
-    for asked in [PartitionChoice::All, PartitionChoice::Sampled(5)] {
-        let setting = format!("policy.partitions={asked}");
-        assert_eq!(partitions(&["env.map=10m_vs_11m", &setting]).0, asked);
-    }
+    let asked = partitions(&["env.map=10m_vs_11m", "policy.partitions=sampled:5"]).0;
+    assert_eq!(asked, PartitionChoice::Sampled(5));
+    let too_many = ConfigBuilder::new()
+        .set("env.map=10m_vs_11m")
+        .and_then(|builder| builder.set("policy.partitions=all"))
+        .unwrap();
+    assert!(
+        too_many.build().is_err(),
+        "whoever asks for all is told why not"
+    );
 }
