@@ -103,7 +103,16 @@ fn every_kind_of_picture_is_what_its_name_says() {
     let line = "replay one.replay.gz --html a.html --svg a.svg --png a.png --step 3 --group A,b";
     succeeds(folder, line);
     succeeds(folder, "replay one.replay.gz --gif a.gif --group 0,1");
+    succeeds(
+        folder,
+        "play --map 2s3z --seed 4 --svg played.svg --step 3 --save-replay two.replay.gz",
+    );
+    succeeds(folder, "replay two.replay.gz --svg replayed.svg --step 3");
     let read = |name: &str| fs::read(folder.join(name)).expect("it was written");
+    assert!(
+        read("played.svg") == read("replayed.svg"),
+        "one picture, whoever draws it"
+    );
     assert!(read("a.html").starts_with(b"<!doctype html>"), "a page");
     assert!(read("a.svg").starts_with(b"<svg "), "a picture");
     assert!(read("a.png").starts_with(b"\x89PNG"), "an image");
@@ -120,6 +129,9 @@ fn what_does_not_go_together_is_a_usage_error() {
     insta::assert_snapshot!(says("replay one.replay.gz --png a.png --group A,Z"), @"error: no agent is called `Z`, expected some of A, B, C, D, E");
     insta::assert_snapshot!(says("replay one.replay.gz --step 3"), @"error: --step says what --svg, --png or --html shows, and none of them is given");
     insta::assert_snapshot!(says("play --map all --save-replay x"), @"error: --save-replay takes one map and one policy, not `all`");
+    insta::assert_snapshot!(says("play --policy all --svg x"), @"error: --svg takes one map and one policy, not `all`");
+    assert!(says("play --svg x --step 999").contains("is after the end"));
+    assert!(says("play --step 3").contains("--svg"));
     assert!(says("explain one.replay.gz --step 999").contains("is no decision"));
     assert!(says("play --save-replay x --episodes 3").contains("cannot be used with"));
 }

@@ -18,12 +18,13 @@ use crate::args::runs::ThreadsArgs;
 /// --out keeps them in a folder, as JSON and as a page with tables of maps by policies; results/scripted was made so.
 ///
 /// --save-replay keeps the first episode: the map, the settings, the seed, every action and a hash of the state after every
-/// step. `mackrl replay` shows it as a page, a picture or a film.
+/// step. `mackrl replay` shows it as a page, a picture or a film. --svg draws one step of it at once.
 ///
 /// Examples:
 ///   mackrl play --map 2s3z --policy focus-fire --episodes 1000 --json
 ///   mackrl play --map all --policy all --episodes 1000 --out results/scripted
 ///   mackrl play --map ./my.toml --policy kite --save-replay battle.replay.gz
+///   mackrl play --map 2s3z --policy nearest --svg battle.svg --step 20
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct PlayArgs {
@@ -65,6 +66,14 @@ pub(crate) struct PlayArgs {
     /// Play the first episode alone, and write it to this file as a replay
     #[arg(long, value_name = "FILE", conflicts_with = "episodes")]
     pub(crate) save_replay: Option<PathBuf>,
+
+    /// Play the first episode alone, and draw one of its steps into this file
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["episodes", "out"])]
+    pub(crate) svg: Option<PathBuf>,
+
+    /// Step that --svg draws, counted from 0, the start [default: half of the episode]
+    #[arg(long, value_name = "T", requires = "svg")]
+    pub(crate) step: Option<usize>,
 }
 
 impl PlayArgs {

@@ -5,7 +5,7 @@ mod statistics;
 
 use mackrl::{
     config::{ConfigBuilder, Engine, EnvironmentConfig},
-    replay::record_script,
+    replay::{Replay, record_script},
 };
 use mackrl_env::{EpisodeKey, Stream, registry};
 
@@ -14,7 +14,7 @@ use crate::{
     commands::sc2,
     failure::Failure,
     output,
-    replay::{Opened, Summary},
+    replay::{Opened, Summary, picture},
     reproduce::Meter,
 };
 use report::Report;
@@ -27,27 +27,51 @@ const ALL: &str = "all";
 pub(crate) fn run(args: &PlayArgs) -> anyhow::Result<()> {
     let maps = maps(args)?;
     let policies = args.policy.policies();
-    let Some(file) = &args.save_replay else {
-        return many(args, &maps, &policies);
+    let kept = match (&args.save_replay, &args.svg) {
+        (None, None) => return many(args, &maps, &policies),
+        (Some(_), _) => "--save-replay",
+        (None, Some(_)) => "--svg",
     };
     let ([map], [policy]) = (&maps[..], &policies[..]) else {
-        return Err(Failure::Usage {
-            message: "--save-replay takes one map and one policy, not `all`".to_owned(),
-        }
-        .into());
+        return Err(usage(&format!(
+            "{kept} takes one map and one policy, not `all`"
+        )));
     };
     let key = EpisodeKey::new(args.seed, Stream::Other, 0);
     if map.engine == Engine::Sc2 {
+        if args.svg.is_some() {
+            return Err(usage(
+                "--svg draws battles of the simulator, and StarCraft II keeps its own replays",
+            ));
+        }
         return sc2::play_one(args, map, *policy, key);
     }
-    let replay = record_script(map, *policy, key)?;
-    output::write_file(file, &replay.to_bytes())?;
-    let summary = Summary::of(&Opened::of(replay)?);
+    one(args, record_script(map, *policy, key)?)
+}
+
+/// Keeps one episode as a replay, as a picture or as both, and prints how it went.
+fn one(args: &PlayArgs, replay: Replay) -> anyhow::Result<()> {
+    if let Some(file) = &args.save_replay {
+        output::write_file(file, &replay.to_bytes())?;
+    }
+    let opened = Opened::of(replay)?;
+    if let Some(file) = &args.svg {
+        let step = opened.check_step(args.step.unwrap_or(opened.playback.steps() / 2))?;
+        output::write_file(file, picture(&opened, step, &[]).to_svg().as_bytes())?;
+    }
+    let summary = Summary::of(&opened);
     if args.json {
         output::print_json(&summary)
     } else {
         output::print(&format!("played: {summary}\n"))
     }
+}
+
+fn usage(message: &str) -> anyhow::Error {
+    Failure::Usage {
+        message: message.to_owned(),
+    }
+    .into()
 }
 
 /// The worlds that were asked for.
