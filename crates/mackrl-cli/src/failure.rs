@@ -159,6 +159,13 @@ impl fmt::Display for Failure {
 impl std::error::Error for Failure {}
 
 impl Failure {
+    /// Flags that do not go together, in words.
+    pub(crate) fn usage(message: impl fmt::Display) -> Self {
+        Self::Usage {
+            message: message.to_string(),
+        }
+    }
+
     /// Whether a run lacks a metric that it was asked for.
     pub(crate) fn is_missing_metric(error: &anyhow::Error) -> bool {
         matches!(error.downcast_ref(), Some(Self::MissingMetric { .. }))

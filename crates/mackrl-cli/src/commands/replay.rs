@@ -11,14 +11,16 @@ use crate::{
 pub(crate) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     let draws_a_step = args.svg.is_some() || args.png.is_some();
     if args.step.is_some() && !draws_a_step && args.html.is_none() {
-        return Err(usage(
+        return Err(Failure::usage(
             "--step says what --svg, --png or --html shows, and none of them is given",
-        ));
+        )
+        .into());
     }
     if !args.group.is_empty() && !draws_a_step && args.gif.is_none() {
-        return Err(usage(
+        return Err(Failure::usage(
             "--group says what --svg, --png or --gif shows, and none of them is given",
-        ));
+        )
+        .into());
     }
     let opened = Opened::read(&args.file)?;
     let group = opened.group(&args.group)?;
@@ -43,11 +45,4 @@ pub(crate) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     } else {
         output::print(&format!("replayed, every state as recorded: {summary}\n"))
     }
-}
-
-fn usage(message: &str) -> anyhow::Error {
-    Failure::Usage {
-        message: message.to_owned(),
-    }
-    .into()
 }

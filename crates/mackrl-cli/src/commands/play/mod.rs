@@ -33,16 +33,17 @@ pub(crate) fn run(args: &PlayArgs) -> anyhow::Result<()> {
         (None, Some(_)) => "--svg",
     };
     let ([map], [policy]) = (&maps[..], &policies[..]) else {
-        return Err(usage(&format!(
-            "{kept} takes one map and one policy, not `all`"
-        )));
+        return Err(
+            Failure::usage(format!("{kept} takes one map and one policy, not `all`")).into(),
+        );
     };
     let key = EpisodeKey::new(args.seed, Stream::Other, 0);
     if map.engine == Engine::Sc2 {
         if args.svg.is_some() {
-            return Err(usage(
+            return Err(Failure::usage(
                 "--svg draws battles of the simulator, and StarCraft II keeps its own replays",
-            ));
+            )
+            .into());
         }
         return sc2::play_one(args, map, *policy, key);
     }
@@ -65,13 +66,6 @@ fn one(args: &PlayArgs, replay: Replay) -> anyhow::Result<()> {
     } else {
         output::print(&format!("played: {summary}\n"))
     }
-}
-
-fn usage(message: &str) -> anyhow::Error {
-    Failure::Usage {
-        message: message.to_owned(),
-    }
-    .into()
 }
 
 /// The worlds that were asked for.

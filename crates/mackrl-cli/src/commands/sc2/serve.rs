@@ -29,7 +29,7 @@ pub(super) fn run(args: &ServeArgs) -> anyhow::Result<()> {
         .as_deref()
         .map(str::parse::<FaultPlan>)
         .transpose();
-    let faults = faults.map_err(|error| usage(&error))?;
+    let faults = faults.map_err(Failure::usage)?;
     let address = address(args)?;
     let units = match args.units {
         UnitsChoice::Liberty => UnitData::Liberty,
@@ -79,15 +79,9 @@ fn address(args: &ServeArgs) -> anyhow::Result<SocketAddr> {
     if args.game.is_empty() {
         return Ok(SocketAddr::new(args.listen, args.port));
     }
-    let game = GameArguments::parse(&args.game).map_err(|error| usage(&error))?;
+    let game = GameArguments::parse(&args.game).map_err(Failure::usage)?;
     end_with_parent();
     Ok(SocketAddr::new(game.listen, game.port))
-}
-
-fn usage(error: &impl ToString) -> Failure {
-    Failure::Usage {
-        message: error.to_string(),
-    }
 }
 
 /// Tells on stderr; nobody has to listen.
