@@ -13,6 +13,8 @@ use mackrl_env::{
 /// State hashes of each map after 40 and 120 random steps, with either set of statistics.
 const GOLDEN: &str = include_str!("golden/skirmish_hashes.txt");
 const MARKS: [usize; 2] = [40, 120];
+/// What the recording was made with, whatever the default is: wide enough that all rules of a start are met.
+const SPAWN_SCATTER: f32 = 0.5;
 /// The version of the simulator, and a hash of what it recorded.
 const RECORDED: (u32, u64) = (2, 0x285C_7BD2_023C_484C);
 
@@ -48,6 +50,7 @@ fn play(skirmish: &mut Skirmish, steps: usize, mut watch: impl FnMut(&Skirmish, 
 fn make(name: &str, units: UnitData) -> Skirmish {
     let settings = SkirmishSettings {
         units,
+        spawn_scatter: SPAWN_SCATTER,
         ..SkirmishSettings::default()
     };
     registry::make_skirmish(name, &settings).expect("the map is shipped")

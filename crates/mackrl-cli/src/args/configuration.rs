@@ -62,8 +62,7 @@ pub(crate) struct ConfigurationArgs {
     #[arg(long, value_name = "MAP", help_heading = "Configuration")]
     pub(crate) map: Option<String>,
 
-    /// What plays the battles: simulator, or sc2 for StarCraft II on this machine, whose enemies follow their map (short for
-    /// `--set env.engine=NAME`, and for `--set env.enemy_order=map` beside sc2)
+    /// What plays the battles: simulator, or sc2 for StarCraft II on this machine (short for `--set env.engine=NAME`)
     #[arg(long, value_name = "NAME", help_heading = "Configuration")]
     pub(crate) env: Option<String>,
 
@@ -117,18 +116,10 @@ impl ConfigurationArgs {
         with_scenario(builder)
     }
 
-    fn short_flags(&self) -> [(&'static str, &'static str, Option<String>); 6] {
+    fn short_flags(&self) -> [(&'static str, &'static str, Option<String>); 5] {
         [
             ("--map", "env.map", self.map.clone()),
             ("--env", "env.engine", self.env.clone()),
-            (
-                "--env",
-                "env.enemy_order",
-                self.env
-                    .as_deref()
-                    .filter(|name| *name == "sc2")
-                    .map(|_| "map".to_owned()),
-            ),
             ("--algorithm", "policy.algorithm", self.algorithm.clone()),
             (
                 "--steps",

@@ -12,6 +12,8 @@ use crate::{bounded, failure::Failure, provenance::Provenance};
 const LENGTH_MAX: usize = 1 << 26;
 /// Share of battles won in greedy tests.
 const WON: &str = "test_battle_won_mean";
+/// What every row of training has.
+const PLAYED: &str = "return_mean";
 /// Delegation by the number of commonly known enemies, which follows.
 const DELEGATION: &str = "mackrl/delegation_rate_ck_enemies_";
 
@@ -25,8 +27,8 @@ pub(crate) struct TrainingRun {
     config: String,
     /// Share of battles won at each test: before training, and after each interval.
     pub(crate) battle_won: Vec<f64>,
-    /// During each interval, the share of chosen pairs that delegated, by the number of enemies they commonly knew; `None`
-    /// where that did not occur.
+    /// During the first batch, and then during each interval, the share of chosen pairs that delegated, by the number of
+    /// enemies they commonly knew; `None` where that did not occur.
     pub(crate) delegation: Vec<Vec<Option<f64>>>,
 }
 
@@ -92,6 +94,7 @@ impl TrainingRun {
     pub(crate) fn of_folder(folder: &Path) -> anyhow::Result<Self> {
         let run = RecordedRun::open(folder.to_owned())?;
         let won = Measurements::read(&run, WON)?;
+        let first_batch = Measurements::read(&run, PLAYED)?.steps.first().copied();
         let mut delegation = vec![Vec::new(); won.values.len()];
         let world = run.config.env.make()?;
         let enemies = world.spec().entities - world.spec().agents;
@@ -103,8 +106,10 @@ impl TrainingRun {
                 Err(error) => return Err(error),
             };
             for (&step, &rate) in rates.steps.iter().zip(&rates.values) {
-                // Rows of tests are those that count; a test after the last batch may stand at the step of another row.
-                let Some(test) = won.steps.iter().rposition(|&test| test == step) else {
+                // Beside the row of the first batch, those of tests count; a test after the last batch may stand at the step of
+                // another row.
+                let test = won.steps.iter().rposition(|&test| test == step);
+                let Some(test) = test.or_else(|| (first_batch == Some(step)).then_some(0)) else {
                     continue;
                 };
                 delegation[test].resize(enemies, None);

@@ -42,9 +42,10 @@ declare_settings! {
         /// What the enemies are told when an episode begins: what their map says, or to go for the nearest agent, wherever it is. Not in
         /// SMAC, whose maps say it.
         enemy_order: EnemyBehaviour = EnemyBehaviour::Map, Accepts::OneOf(&["map", "hunt"]);
-        /// Map units by which a unit starts beside its place on the map, at most, along each axis; drawn anew for every episode. Not
-        /// in SMAC, where the engine places units: see `DEVIATIONS.md`.
-        spawn_scatter: f32 = 0.5, Accepts::within(0.0, 4.0);
+        /// Map units by which a unit starts beside its place on the map, at most, along each axis; drawn anew for every episode. The
+        /// least that keeps mirror images of an army from fighting as one. Not in SMAC, where the engine places units: see
+        /// `DEVIATIONS.md`.
+        spawn_scatter: f32 = 0.02, Accepts::within(0.0, 4.0);
         /// Map units that a move is ordered to go. Half of it is how far ahead availability looks.
         move_amount: f32 = 2.0, Accepts::above_within(0.0, 32.0);
         /// Map units within which an agent sees, centre to centre, exclusive.

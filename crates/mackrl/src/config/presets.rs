@@ -63,8 +63,6 @@ impl Preset {
 mod tests {
     use crate::config::{Config, ConfigBuilder, Origin};
 
-    use mackrl_env::skirmish::EnemyBehaviour;
-
     use super::*;
 
     #[test]
@@ -88,11 +86,9 @@ mod tests {
     }
 
     #[test]
-    fn the_default_preset_is_what_is_built_in_but_for_enemies_that_seek() {
+    fn the_default_preset_is_what_is_built_in() {
         let preset = ConfigBuilder::new().preset("default").unwrap();
-        let mut built_in = Config::default();
-        built_in.env.settings.enemy_order = EnemyBehaviour::Hunt;
-        assert_eq!(preset.build().unwrap(), built_in);
+        assert_eq!(preset.build().unwrap(), Config::default());
     }
 
     #[test]

@@ -132,7 +132,8 @@ impl Trainer {
     }
 
     /// Plays and learns from one batch of episodes, or plays a test if one is due: before the first batch, at every interval,
-    /// and after the last batch. Gives a row of metrics at every test and at every interval between.
+    /// and after the last batch. Gives a row of metrics at every test, at every interval between, and after the first batch, which an
+    /// untrained team played.
     ///
     /// # Errors
     /// [`Error::NotFinite`] if a number is not finite: one that an environment gives, a logit, a number of the critic's, a
@@ -334,7 +335,10 @@ impl Trainer {
     fn row(&mut self) -> MetricRow {
         let interval = std::mem::replace(&mut self.interval, Interval::new(self.steps_env));
         let every = self.config.run.metrics_interval_steps_env;
-        self.next_row = (self.steps_env / every + 1) * every;
+        self.next_row = match self.steps_env {
+            0 => 1,
+            played => (played / every + 1) * every,
+        };
         let mut row = MetricRow::default();
         row.push("t_env", self.steps_env as f64);
         row.push("episode", self.episodes as f64);

@@ -13,7 +13,7 @@ pub(super) fn chart(report: &Figure7Report) -> LineChart {
         .iter()
         .zip(COLOURS)
         .map(|(moment, colour)| Series {
-            name: Some(format!("after {} k steps", moment.steps / 1_000)),
+            name: Some(moment.when()),
             colour,
             mark: Mark::Line,
             points: points(moment),

@@ -33,8 +33,8 @@ pub(super) fn claims(moments: &[Moment]) -> Vec<Claim> {
             source: ClaimSource::Paper,
             holds: rates.iter().all(|rate| rate.is_some_and(holds)),
             evidence: format!(
-                "After {} steps, with {enemies:?} commonly known enemies: {}; the rule asks for {rule}. Published: {}.",
-                moment.steps,
+                "With {enemies:?} commonly known enemies, {}: {}; the rule asks for {rule}. Published: {}.",
+                moment.when(),
                 numbers.join(", "),
                 published.join(", ")
             ),

@@ -23,8 +23,9 @@ use crate::{plot::LineChart, provenance::Provenance, recorded::TrainingRun};
 
 /// Enemies on the map.
 const ENEMIES: usize = 5;
-/// When the paper looked, in steps of its 2.5 million; here the same shares of training.
-const PUBLISHED_STEPS: [u64; 4] = [400, 500_000, 1_200_000, 1_600_000];
+/// When the paper looked, in steps of its 2.5 million; here the same shares of training. What it shows at 400 steps can only be
+/// the first batch.
+const PUBLISHED_STEPS: [u64; 4] = [0, 500_000, 1_200_000, 1_600_000];
 /// Length of the paper's training in steps.
 const PUBLISHED_LENGTH: f64 = 2_500_000.0;
 /// Delegation rates of the published figure, read from its vector graphics, for 0 to 5 enemies at each moment.
@@ -64,10 +65,10 @@ pub(crate) struct Figure7Report {
     pub(crate) claims: Vec<Claim>,
 }
 
-/// Delegation during one interval of training.
+/// Delegation during one interval of training, or during the first batch.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Moment {
-    /// Environment steps at the interval's end.
+    /// Environment steps at the interval's end; 0 for the first batch, which an untrained team played.
     pub(crate) steps: u64,
     /// By the number of commonly known enemies, from 0.
     pub(crate) rates: Vec<Rate>,
@@ -106,6 +107,16 @@ pub(crate) fn run(options: &Figure7Options) -> anyhow::Result<Figure7Report> {
     Ok(report)
 }
 
+impl Moment {
+    /// When that was, in words.
+    fn when(&self) -> String {
+        match self.steps {
+            0 => "in the first batch".to_owned(),
+            steps => format!("after {} k steps", steps / 1_000),
+        }
+    }
+}
+
 impl Figure7Report {
     /// The figure.
     pub(crate) fn chart(&self) -> LineChart {
@@ -135,14 +146,14 @@ fn report(options: &LearningOptions, runs: &[TrainingRun]) -> Figure7Report {
     }
 }
 
-/// The number of the test that ends the interval in which a share of training is reached; the first interval ends with test 1.
+/// The number of the test that ends the interval in which a share of training is reached; 0 stands for the first batch.
 fn interval_at(share: f64, options: &LearningOptions) -> usize {
     let tests = usize::try_from(options.steps / options.interval)
         .unwrap_or(usize::MAX)
         .max(1);
     let reached =
         |test: &usize| *test as f64 * options.interval as f64 >= share * options.steps as f64;
-    (1..=tests).find(reached).unwrap_or(tests)
+    (0..=tests).find(reached).unwrap_or(tests)
 }
 
 fn rate(runs: &[TrainingRun], interval: usize, enemies: usize) -> Rate {
@@ -169,8 +180,8 @@ mod tests {
         };
         let long = options(2_500_000, 25_000);
         assert_eq!(
-            [0.000_16, 0.2, 0.48, 0.64].map(|share| interval_at(share, &long)),
-            [1, 20, 48, 64]
+            [0.0, 0.2, 0.48, 0.64].map(|share| interval_at(share, &long)),
+            [0, 20, 48, 64]
         );
         assert_eq!(interval_at(0.64, &options(1_000, 1_000)), 1);
     }

@@ -12,17 +12,17 @@ impl Display for Figure7Report {
             self.seeds
         )?;
         writeln!(out, "{}\n", self.command)?;
-        write!(out, "{:>10}            ", "steps")?;
+        write!(out, "{:>18}            ", "")?;
         (0..=ENEMIES).try_for_each(|enemies| write!(out, "{enemies:>8}"))?;
         for moment in &self.moments {
-            write!(out, "\n{:>10}  ours      ", moment.steps)?;
+            write!(out, "\n{:>18}  ours      ", moment.when())?;
             for rate in &moment.rates {
                 match rate.mean {
                     Some(mean) => write!(out, "{mean:>8.3}")?,
                     None => write!(out, "{:>8}", "–")?,
                 }
             }
-            write!(out, "\n{:>10}  published ", "")?;
+            write!(out, "\n{:>18}  published ", "")?;
             moment
                 .published
                 .iter()
