@@ -3,76 +3,78 @@
 use super::{
     chart::{Colour, Corner, LineChart, Mark, Point, Series},
     scale::Scale,
-    scene::{Anchor, Direction, Rectangle, Scene, Shape, Weight, Words},
+    scene::{Anchor, Direction, Panel, Rectangle, Scene, Shape, Weight, Words},
     text,
 };
 
 const WIDTH: u16 = 720;
 const HEIGHT: u16 = 480;
-const MARGIN: f64 = 20.0;
-const TITLE_SIZE: f64 = 17.0;
-const SUBTITLE_SIZE: f64 = 12.0;
-const LABEL_SIZE: f64 = 13.0;
-const TICK_SIZE: f64 = 12.0;
+pub(super) const MARGIN: f64 = 20.0;
+pub(super) const TITLE_SIZE: f64 = 17.0;
+pub(super) const SUBTITLE_SIZE: f64 = 12.0;
+pub(super) const LABEL_SIZE: f64 = 13.0;
+pub(super) const TICK_SIZE: f64 = 12.0;
 const LEGEND_ROW: f64 = 19.0;
-const SAMPLE_WIDTH: f64 = 25.0;
+pub(super) const SAMPLE_WIDTH: f64 = 25.0;
 const LINE_WIDTH: f64 = 2.25;
 const DASHES_WIDTH: f64 = 1.25;
 const RING_RADIUS: f64 = 3.4;
 const BAND_OPACITY: f64 = 0.18;
 /// Share of a font's size by which a base line lies below the middle of its lower-case letters.
-const MIDDLE: f64 = 0.35;
+pub(super) const MIDDLE: f64 = 0.35;
 
 const WHITE: Colour = Colour(0xFF, 0xFF, 0xFF);
-const INK: Colour = Colour(0x22, 0x22, 0x22);
-const FAINT_INK: Colour = Colour(0x5A, 0x5A, 0x5A);
+pub(super) const INK: Colour = Colour(0x22, 0x22, 0x22);
+pub(super) const FAINT_INK: Colour = Colour(0x5A, 0x5A, 0x5A);
 const GRID: Colour = Colour(0xE4, 0xE4, 0xE4);
 
 /// Both axes in pixels.
-struct Axes {
-    x: Scale,
-    y: Scale,
+pub(super) struct Axes {
+    pub(super) x: Scale,
+    pub(super) y: Scale,
 }
 
 /// Lays `chart` out.
 pub(super) fn lay_out(chart: &LineChart) -> Scene {
-    let x = scale(chart.x_axis.range, chart, 6.0, |point| [point.x; 2]);
-    let y = scale(chart.y_axis.range, chart, 7.0, |point| point.band);
-    let plot_area = plot_area(chart, &y);
+    let points = || chart.series.iter().flat_map(|series| &series.points);
+    let x = scale(chart.x_axis.range, 6.0, points().map(|point| point.x));
+    let heights = points().flat_map(|point| point.band);
+    let y = scale(chart.y_axis.range, 7.0, heights);
+    let area = plot_area(chart, &y);
     let axes = Axes {
-        x: x.onto(plot_area.left, plot_area.right),
-        y: y.onto(plot_area.bottom, plot_area.top),
+        x: x.onto(area.left, area.right),
+        y: y.onto(area.bottom, area.top),
     };
-    let mut foreground = axis_words(chart, plot_area, &axes);
-    foreground.extend(titles(chart, plot_area));
-    foreground.extend(legend(chart, plot_area));
+    let mut foreground = axis_words(chart, area, &axes);
+    foreground.extend(titles(&chart.title, &chart.subtitle, area.left));
+    foreground.extend(legend(chart, area));
+    let panel = Panel {
+        area,
+        background: grid(area, &axes),
+        data: data(&chart.series, &axes),
+        foreground,
+    };
     Scene {
         width: WIDTH,
         height: HEIGHT,
-        plot_area,
-        background: grid(plot_area, &axes),
-        data: data(chart, &axes),
-        foreground,
+        panels: vec![panel],
     }
 }
 
-fn scale(
+/// The scale of `range`, or one that fits `values`.
+pub(super) fn scale(
     range: Option<[f64; 2]>,
-    chart: &LineChart,
     ticks: f64,
-    extent: impl Fn(&Point) -> [f64; 2],
+    values: impl Iterator<Item = f64>,
 ) -> Scale {
-    let points = chart.series.iter().flat_map(|series| &series.points);
     range.map_or_else(
-        || Scale::fitting(points.flat_map(extent), ticks),
+        || Scale::fitting(values, ticks),
         |range| Scale::new(range, ticks),
     )
 }
 
 fn plot_area(chart: &LineChart, y: &Scale) -> Rectangle {
-    let widest = (y.ticks().iter())
-        .map(|(_, label)| text::width(label, TICK_SIZE, Weight::Regular))
-        .fold(0.0, f64::max);
+    let widest = widest_label(y);
     let subtitle = if chart.subtitle.is_empty() { 0.0 } else { 19.0 };
     Rectangle {
         left: MARGIN + LABEL_SIZE + 12.0 + widest + 8.0,
@@ -82,7 +84,15 @@ fn plot_area(chart: &LineChart, y: &Scale) -> Rectangle {
     }
 }
 
-fn grid(area: Rectangle, axes: &Axes) -> Vec<Shape> {
+/// Width of the widest label of an axis.
+pub(super) fn widest_label(scale: &Scale) -> f64 {
+    (scale.ticks().iter())
+        .map(|(_, label)| text::width(label, TICK_SIZE, Weight::Regular))
+        .fold(0.0, f64::max)
+}
+
+/// Horizontal lines at the ticks of the vertical axis, and the horizontal axis.
+pub(super) fn grid(area: Rectangle, axes: &Axes) -> Vec<Shape> {
     let line = |points, colour| Shape::Line {
         points,
         colour,
@@ -107,52 +117,70 @@ fn grid(area: Rectangle, axes: &Axes) -> Vec<Shape> {
 }
 
 fn axis_words(chart: &LineChart, area: Rectangle, axes: &Axes) -> Vec<Shape> {
-    let tick = |text: String, at: [f64; 2], anchor| {
-        Shape::Words(Words {
-            anchor,
-            ..words(text, at, TICK_SIZE, FAINT_INK)
-        })
-    };
-    let mut shapes = Vec::new();
-    for (value, label) in axes.x.ticks() {
-        let at = [axes.x.place(value), area.bottom + TICK_SIZE + 8.0];
-        shapes.push(tick(label, at, Anchor::Middle));
-    }
-    for (value, label) in axes.y.ticks() {
-        let at = [area.left - 8.0, axes.y.place(value) + MIDDLE * TICK_SIZE];
-        shapes.push(tick(label, at, Anchor::End));
-    }
+    let mut shapes = ticks_below(area, &axes.x);
+    shapes.extend(ticks_beside(area, &axes.y));
     let below = [
         f64::midpoint(area.left, area.right),
         f64::from(HEIGHT) - MARGIN,
     ];
-    shapes.push(Shape::Words(Words {
-        anchor: Anchor::Middle,
-        ..words(chart.x_axis.label.clone(), below, LABEL_SIZE, INK)
-    }));
+    shapes.push(label(&chart.x_axis.label, below, Direction::Rightwards));
     let beside = [MARGIN + LABEL_SIZE, f64::midpoint(area.top, area.bottom)];
-    shapes.push(Shape::Words(Words {
-        anchor: Anchor::Middle,
-        direction: Direction::Upwards,
-        ..words(chart.y_axis.label.clone(), beside, LABEL_SIZE, INK)
-    }));
+    shapes.push(label(&chart.y_axis.label, beside, Direction::Upwards));
     shapes
 }
 
-fn titles(chart: &LineChart, area: Rectangle) -> Vec<Shape> {
+/// The numbers at the horizontal axis.
+pub(super) fn ticks_below(area: Rectangle, x: &Scale) -> Vec<Shape> {
+    let ticks = x.ticks().into_iter();
+    let shapes = ticks.map(|(value, label)| {
+        let at = [x.place(value), area.bottom + TICK_SIZE + 8.0];
+        tick(label, at, Anchor::Middle)
+    });
+    shapes.collect()
+}
+
+/// The numbers at the vertical axis.
+pub(super) fn ticks_beside(area: Rectangle, y: &Scale) -> Vec<Shape> {
+    let ticks = y.ticks().into_iter();
+    let shapes = ticks.map(|(value, label)| {
+        let at = [area.left - 8.0, y.place(value) + MIDDLE * TICK_SIZE];
+        tick(label, at, Anchor::End)
+    });
+    shapes.collect()
+}
+
+fn tick(label: String, at: [f64; 2], anchor: Anchor) -> Shape {
+    Shape::Words(Words {
+        anchor,
+        ..words(label, at, TICK_SIZE, FAINT_INK)
+    })
+}
+
+/// Quantity and unit of an axis, centred at `at`.
+pub(super) fn label(text: &str, at: [f64; 2], direction: Direction) -> Shape {
+    Shape::Words(Words {
+        anchor: Anchor::Middle,
+        direction,
+        ..words(text.to_owned(), at, LABEL_SIZE, INK)
+    })
+}
+
+/// What stands above a chart.
+pub(super) fn titles(title: &str, subtitle: &str, left: f64) -> [Shape; 2] {
     let base = MARGIN + TITLE_SIZE * 0.8;
     let title = Words {
         weight: Weight::Medium,
-        ..words(chart.title.clone(), [area.left, base], TITLE_SIZE, INK)
+        ..words(title.to_owned(), [left, base], TITLE_SIZE, INK)
     };
-    let at = [area.left, base + 19.0];
-    let subtitle = words(chart.subtitle.clone(), at, SUBTITLE_SIZE, FAINT_INK);
-    vec![Shape::Words(title), Shape::Words(subtitle)]
+    let at = [left, base + 19.0];
+    let subtitle = words(subtitle.to_owned(), at, SUBTITLE_SIZE, FAINT_INK);
+    [title, subtitle].map(Shape::Words)
 }
 
-fn data(chart: &LineChart, axes: &Axes) -> Vec<Shape> {
-    let bands = chart.series.iter().filter_map(|series| band(series, axes));
-    let marks = chart.series.iter().flat_map(|series| {
+/// Bands below, lines and marks above.
+pub(super) fn data(series: &[Series], axes: &Axes) -> Vec<Shape> {
+    let bands = series.iter().filter_map(|series| band(series, axes));
+    let marks = series.iter().flat_map(|series| {
         let places = (series.points.iter())
             .map(|point| [axes.x.place(point.x), axes.y.place(point.y)])
             .collect();
@@ -241,7 +269,7 @@ fn legend(chart: &LineChart, area: Rectangle) -> Vec<Shape> {
 }
 
 /// What a series looks like, beside its name.
-fn sample(series: &Series, start: f64, middle: f64) -> Vec<Shape> {
+pub(super) fn sample(series: &Series, start: f64, middle: f64) -> Vec<Shape> {
     let end = start + SAMPLE_WIDTH;
     let places = match series.mark {
         Mark::Line | Mark::Dashes => vec![[start, middle], [end, middle]],
@@ -265,7 +293,7 @@ fn sample(series: &Series, start: f64, middle: f64) -> Vec<Shape> {
     shapes
 }
 
-const fn words(text: String, at: [f64; 2], size: f64, colour: Colour) -> Words {
+pub(super) const fn words(text: String, at: [f64; 2], size: f64, colour: Colour) -> Words {
     Words {
         text,
         at,

@@ -1,7 +1,7 @@
 //! Line charts with bands, and pictures of battles, as SVG and PNG.
 //!
 //! A chart is data: titles, axes and series of points. It knows nothing of learners, games or files, so a figure can be
-//! redrawn from what a run has written. [`LineChart`] is laid out once into a scene of polygons, lines, discs and words, and
+//! redrawn from what a run has written. [`LineChart`] or [`SmallMultiples`] is laid out once into a scene of polygons, lines, discs and words, and
 //! both writers draw that scene: the two files show the same picture. Words are drawn from fonts that the program carries,
 //! because many servers have none.
 //!
@@ -11,6 +11,7 @@
 mod battle;
 mod chart;
 mod layout;
+mod multiples;
 mod png;
 mod scale;
 mod scene;
@@ -19,7 +20,7 @@ mod text;
 
 pub(crate) use battle::{BattlePicture, Figure, Lens, Link, Shot, Side};
 pub(crate) use chart::{Axis, Colour, Corner, LineChart, Mark, Point, Series};
-
+pub(crate) use multiples::{Multiple, SmallMultiples};
 pub(crate) use png::Pixels;
 
 #[cfg(test)]

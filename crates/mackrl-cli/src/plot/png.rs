@@ -54,15 +54,17 @@ fn draw(scene: &Scene, scale: u16) -> anyhow::Result<Pixmap> {
         mask: None,
     };
     canvas.pixmap.fill(tiny_skia::Color::WHITE);
-    scene.background.iter().for_each(|shape| canvas.draw(shape));
-    let mut mask = Mask::new(width, height).context("the chart has no area")?;
-    if let Some(area) = polygon(&scene.plot_area.corners()) {
-        mask.fill_path(&area, FillRule::Winding, true, canvas.transform);
+    for panel in &scene.panels {
+        panel.background.iter().for_each(|shape| canvas.draw(shape));
+        let mut mask = Mask::new(width, height).context("the chart has no area")?;
+        if let Some(area) = polygon(&panel.area.corners()) {
+            mask.fill_path(&area, FillRule::Winding, true, canvas.transform);
+        }
+        canvas.mask = Some(mask);
+        panel.data.iter().for_each(|shape| canvas.draw(shape));
+        canvas.mask = None;
+        panel.foreground.iter().for_each(|shape| canvas.draw(shape));
     }
-    canvas.mask = Some(mask);
-    scene.data.iter().for_each(|shape| canvas.draw(shape));
-    canvas.mask = None;
-    scene.foreground.iter().for_each(|shape| canvas.draw(shape));
     Ok(canvas.pixmap)
 }
 

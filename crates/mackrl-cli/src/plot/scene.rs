@@ -9,11 +9,18 @@ pub(super) struct Scene {
     pub(super) width: u16,
     /// Height of the picture.
     pub(super) height: u16,
+    /// Drawn in order; they do not overlap.
+    pub(super) panels: Vec<Panel>,
+}
+
+/// A part of a picture with data of its own.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Panel {
     /// Where data may be drawn.
-    pub(super) plot_area: Rectangle,
+    pub(super) area: Rectangle,
     /// Grid and frame, drawn first.
     pub(super) background: Vec<Shape>,
-    /// Data, clipped to the plot area.
+    /// Data, clipped to the area.
     pub(super) data: Vec<Shape>,
     /// Words and the legend, drawn last.
     pub(super) foreground: Vec<Shape>,

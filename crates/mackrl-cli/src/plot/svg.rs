@@ -10,31 +10,33 @@ use super::{
 /// The document; `title` is what screen readers say.
 pub(super) fn write(scene: &Scene, title: &str) -> String {
     let (width, height) = (scene.width, scene.height);
-    let area = scene.plot_area;
     let mut out = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
          viewBox=\"0 0 {width} {height}\" role=\"img\" \
          font-family=\"Roboto, 'Helvetica Neue', Arial, sans-serif\">\n\
          <title>{}</title>\n\
-         <defs><clipPath id=\"plot-area\"><rect x=\"{:.2}\" y=\"{:.2}\" width=\"{:.2}\" height=\"{:.2}\"/></clipPath></defs>\n\
          <rect width=\"{width}\" height=\"{height}\" fill=\"#ffffff\"/>\n",
         escape(title),
-        area.left,
-        area.top,
-        area.right - area.left,
-        area.bottom - area.top,
     );
-    for (group, shapes) in [
-        ("<g>", &scene.background),
-        ("<g clip-path=\"url(#plot-area)\">", &scene.data),
-        ("<g>", &scene.foreground),
-    ] {
-        out.push_str(group);
-        out.push('\n');
-        shapes
-            .iter()
-            .for_each(|shape| out.push_str(&element(shape)));
-        out.push_str("</g>\n");
+    for (number, panel) in scene.panels.iter().enumerate() {
+        let area = panel.area;
+        let (left, top) = (area.left, area.top);
+        let (across, down) = (area.right - left, area.bottom - top);
+        out += &format!(
+            "<clipPath id=\"panel-{number}\"><rect x=\"{left:.2}\" y=\"{top:.2}\" width=\"{across:.2}\" \
+             height=\"{down:.2}\"/></clipPath>\n"
+        );
+        let clipped = format!("<g clip-path=\"url(#panel-{number})\">");
+        for (group, shapes) in [
+            ("<g>", &panel.background),
+            (&*clipped, &panel.data),
+            ("<g>", &panel.foreground),
+        ] {
+            out += group;
+            out.push('\n');
+            shapes.iter().for_each(|shape| out += &element(shape));
+            out += "</g>\n";
+        }
     }
     out.push_str("</svg>\n");
     out

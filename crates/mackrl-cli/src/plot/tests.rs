@@ -54,7 +54,7 @@ fn a_band_covers_what_would_be_paper() {
 #[test]
 fn data_beyond_the_axes_is_clipped_in_both_files() {
     let svg = chart(Mark::Line, 0.0).to_svg();
-    assert!(svg.contains("<g clip-path=\"url(#plot-area)\">"), "{svg}");
+    assert!(svg.contains("<g clip-path=\"url(#panel-0)\">"), "{svg}");
     let image = Pixmap::decode_png(&chart(Mark::Line, 0.0).to_png().unwrap()).unwrap();
     // The line leaves through the top of the plot; nothing blue may stand in the row of the title above it.
     let title_rows = image.pixels().iter().take(image.width() as usize * 70);

@@ -6,7 +6,7 @@ use super::{
     legend, lens,
     marks::{bars, body, circle, closed, cross, filled, link, name_tag, open, words},
 };
-use crate::plot::scene::{Rectangle, Scene, Shape, Weight};
+use crate::plot::scene::{Panel, Rectangle, Scene, Shape, Weight};
 
 /// Width in pixels that the arena is fitted to.
 const WIDTH: f64 = 840.0;
@@ -63,13 +63,16 @@ impl<'a> Drawing<'a> {
             closed(&area.corners(), WALL, 1.0),
         ];
         foreground.extend(legend.shapes);
-        Scene {
-            width: pixels(area.right + MARGIN),
-            height: pixels(area.bottom + legend.height + 8.0),
-            plot_area: area,
+        let battle = Panel {
+            area,
             background: self.window.ground(self.picture, area, |at| self.place(at)),
             data: self.battle(),
             foreground,
+        };
+        Scene {
+            width: pixels(area.right + MARGIN),
+            height: pixels(area.bottom + legend.height + 8.0),
+            panels: vec![battle],
         }
     }
 

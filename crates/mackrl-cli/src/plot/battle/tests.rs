@@ -59,7 +59,7 @@ fn less_life_is_a_shorter_bar() {
 #[test]
 fn the_window_is_as_large_as_asked_and_inside_the_map() {
     let scene = Drawing::new(&picture(1.0)).scene();
-    let area = scene.plot_area;
+    let area = scene.panels[0].area;
     assert_eq!(
         area.right - area.left,
         8.0 * 52.0,

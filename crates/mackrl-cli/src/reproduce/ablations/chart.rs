@@ -1,41 +1,62 @@
-//! The ablations as a chart: a curve for each variant.
+//! The ablations as a chart: a panel for each variant, with MACKRL in all of them.
 
-use super::AblationReport;
-use crate::plot::{Axis, Colour, Corner, LineChart, Mark, Point, Series};
+use super::{AblationReport, VariantReport};
+use crate::plot::{Axis, Colour, Mark, Multiple, Point, Series, SmallMultiples};
 
-/// The chart of `report`. Only MACKRL has a band: nine of them would hide each other, and the table has every error.
-pub(super) fn chart(report: &AblationReport) -> LineChart {
-    let range = Some([-0.02, 1.02]);
-    let series: Vec<Series> = (report.variants.iter().zip(Colour::LINES))
-        .enumerate()
-        .map(|(number, (variant, colour))| {
-            let tests = (variant.curve.mean.iter().zip(&variant.curve.sem)).zip(&report.steps);
-            let point = |((&mean, &error), &step): ((&f64, &f64), &u64)| match number {
-                0 => Point::with_error(step as f64, mean, error),
-                _ => Point::exact(step as f64, mean),
-            };
-            Series {
-                name: Some(format!("{} ({})", variant.label, variant.curve.runs)),
-                colour,
-                mark: Mark::Line,
-                points: tests.map(point).collect(),
-            }
-        })
-        .collect();
-    LineChart {
+/// Panels side by side.
+const COLUMNS: usize = 4;
+
+/// The chart of `report`.
+pub(super) fn chart(report: &AblationReport) -> SmallMultiples {
+    let Some((mackrl, others)) = report.variants.split_first() else {
+        unreachable!("a report begins with MACKRL");
+    };
+    let panel = |variant: &VariantReport| Multiple {
+        title: variant.label.to_owned(),
+        note: note(variant),
+        series: vec![
+            series(report, mackrl, "MACKRL", Colour::BLUE),
+            series(report, variant, "what the panel names", Colour::VERMILLION),
+        ],
+    };
+    SmallMultiples {
         title: format!("What MACKRL's parts are worth on {}", report.map),
-        subtitle:
-            "Greedy tests during training; mean over seeds, band of MACKRL ± one standard error"
-                .into(),
+        subtitle: format!(
+            "Greedy tests during training; mean of {} seeds, band ± one standard error. The number: final win rate against MACKRL's",
+            report.seeds
+        ),
         x_axis: Axis {
             label: "Environment steps".into(),
             range: None,
         },
         y_axis: Axis {
             label: "Share of battles won".into(),
-            range,
+            range: Some([-0.02, 1.02]),
         },
-        legend: Corner::emptiest(&series, range),
-        series,
+        columns: COLUMNS,
+        panels: others.iter().map(panel).collect(),
+    }
+}
+
+fn note(variant: &VariantReport) -> String {
+    variant.versus_mackrl.map_or_else(String::new, |versus| {
+        let sign = if versus.difference < 0.0 { '−' } else { '+' };
+        format!(
+            "{sign}{:.2} ± {:.2}",
+            versus.difference.abs(),
+            versus.error
+        )
+    })
+}
+
+fn series(report: &AblationReport, variant: &VariantReport, name: &str, colour: Colour) -> Series {
+    let tests = (variant.curve.mean.iter().zip(&variant.curve.sem)).zip(&report.steps);
+    Series {
+        name: Some(name.to_owned()),
+        colour,
+        mark: Mark::Line,
+        points: tests
+            .map(|((&mean, &error), &step)| Point::with_error(step as f64, mean, error))
+            .collect(),
     }
 }

@@ -26,7 +26,7 @@ use super::{
     write,
 };
 use crate::{
-    plot::LineChart,
+    plot::SmallMultiples,
     provenance::Provenance,
     recorded::{TrainingRun, final_mean},
 };
@@ -176,7 +176,7 @@ fn report(
 
 impl AblationReport {
     /// The plot.
-    pub(crate) fn chart(&self) -> LineChart {
+    pub(crate) fn chart(&self) -> SmallMultiples {
         chart::chart(self)
     }
 }

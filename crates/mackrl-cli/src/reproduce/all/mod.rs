@@ -25,6 +25,7 @@ use super::{
     meter::Meter,
     write,
 };
+use crate::plot::LineChart;
 use page::Section;
 
 /// The page's name.
@@ -133,21 +134,21 @@ impl AllReport {
         let mut sections = vec![
             Section {
                 title: "Figure 5: the matrix game",
-                charts: vec![self.figure5.chart()],
+                charts: vec![self.figure5.chart().to_svg()],
                 claims: &self.figure5.claims,
                 text: self.figure5.to_string(),
                 provenance: provenance(serde_json::to_string_pretty(&self.figure5.provenance))?,
             },
             Section {
                 title: "Figure 6: battles won during training",
-                charts: self.figure6.charts(),
+                charts: (self.figure6.charts().iter().map(LineChart::to_svg)).collect(),
                 claims: &self.figure6.claims,
                 text: self.figure6.to_string(),
                 provenance: provenance(serde_json::to_string_pretty(&self.figure6.provenance))?,
             },
             Section {
                 title: "Figure 7: when pairs delegate",
-                charts: vec![self.figure7.chart()],
+                charts: vec![self.figure7.chart().to_svg()],
                 claims: &self.figure7.claims,
                 text: self.figure7.to_string(),
                 provenance: provenance(serde_json::to_string_pretty(&self.figure7.provenance))?,
@@ -156,7 +157,7 @@ impl AllReport {
         if let Some(ablations) = &self.ablations {
             sections.push(Section {
                 title: "Ablations: where the gain comes from",
-                charts: vec![ablations.chart()],
+                charts: vec![ablations.chart().to_svg()],
                 claims: &ablations.claims,
                 text: ablations.to_string(),
                 provenance: provenance(serde_json::to_string_pretty(&ablations.provenance))?,

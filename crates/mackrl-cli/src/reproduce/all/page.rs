@@ -1,14 +1,15 @@
 //! The report as one HTML page that needs no other file.
 
 use super::Claim;
-use crate::{plot::LineChart, provenance::CODE, reproduce::ClaimSource};
+use crate::{provenance::CODE, reproduce::ClaimSource};
 
 const STYLE: &str = include_str!("page.css");
 
 /// One part of the page.
 pub(super) struct Section<'a> {
     pub(super) title: &'static str,
-    pub(super) charts: Vec<LineChart>,
+    /// SVG documents.
+    pub(super) charts: Vec<String>,
     pub(super) claims: &'a [Claim],
     /// What the command prints: our numbers beside the published ones.
     pub(super) text: String,
@@ -57,8 +58,9 @@ impl Section<'_> {
         );
         for (place, chart) in self.charts.iter().enumerate() {
             // Names inside a drawing are names of the whole page.
-            let unique = format!("plot-area-{number}-{place}");
-            html += &chart.to_svg().replace("plot-area", &unique);
+            let prefix = format!("chart-{number}-{place}-panel-");
+            html += &(chart.replace("id=\"panel-", &format!("id=\"{prefix}")))
+                .replace("url(#panel-", &format!("url(#{prefix}"));
         }
         html += "</div>\n";
         for claim in self.claims {
@@ -112,7 +114,7 @@ fn escaped(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plot::{Axis, Corner};
+    use crate::plot::{Axis, Corner, LineChart};
 
     fn chart() -> LineChart {
         let axis = || Axis {
@@ -140,7 +142,7 @@ mod tests {
         let claims = [claim(true), claim(false)];
         let section = Section {
             title: "Figure 0",
-            charts: vec![chart(), chart()],
+            charts: vec![chart().to_svg(), chart().to_svg()],
             claims: &claims,
             text: "numbers".into(),
             provenance: "{}".into(),
@@ -148,7 +150,7 @@ mod tests {
         let listed = [("Figure 0", &claims[0]), ("Figure 0", &claims[1])];
         let html = html("mackrl reproduce all", &listed, &[section]);
         assert_eq!(html.matches("<svg ").count(), 2);
-        for place in ["plot-area-0-0", "plot-area-0-1"] {
+        for place in ["chart-0-0-panel-0", "chart-0-1-panel-0"] {
             assert_eq!(
                 html.matches(&format!("id=\"{place}\"")).count(),
                 1,
