@@ -66,7 +66,8 @@ impl SmallMultiples {
     }
 
     fn scene(&self) -> Scene {
-        let points = || (self.panels.iter().flat_map(|panel| &panel.series)).flat_map(|s| &s.points);
+        let points =
+            || (self.panels.iter().flat_map(|panel| &panel.series)).flat_map(|s| &s.points);
         let x = scale(self.x_axis.range, 3.0, points().map(|point| point.x));
         let heights = points().flat_map(|point| point.band);
         let y = scale(self.y_axis.range, 4.0, heights);

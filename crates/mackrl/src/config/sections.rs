@@ -12,6 +12,7 @@ use crate::config::{
     error::{nearest, shortened},
     settings::in_section,
 };
+use crate::learner::LossAverage;
 
 /// Everything that determines the result of a run.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -79,6 +80,9 @@ declare_settings! {
         target_interval_updates: u64 = 200, Accepts::integer(1, EXACT);
         /// Longest gradient (Euclidean norm over all parameters of the policy, or of the critic); longer ones are shortened.
         gradient_norm_max: f64 = 10.0, Accepts::above(0.0);
+        /// What a step counts for in the policy's loss: all steps of a batch alike, or, as in the authors' code, those of each time
+        /// slot together as much as those of another, so that late steps of long episodes count for more.
+        loss_average: LossAverage = LossAverage::Steps, Accepts::OneOf(&["steps", "slots"]);
         /// Environments that run side by side; each gives one episode to an update.
         environments: usize = 8, Accepts::integer(1, 4096);
         /// Whether the state at a time limit keeps its value; otherwise time running out counts as the end of the game.

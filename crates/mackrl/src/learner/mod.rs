@@ -6,6 +6,8 @@
 //! Every shard has a gradient of its own, and they are summed in the order of the shards: the number of threads changes
 //! nothing.
 
+mod average;
+
 use mackrl_env::{EpisodeKey, Stream};
 
 use crate::{
@@ -20,6 +22,8 @@ use crate::{
     rollout::{Episode, ShardBatch},
 };
 
+pub use average::LossAverage;
+
 /// How the policy learns.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LearnerSettings {
@@ -29,6 +33,8 @@ pub struct LearnerSettings {
     pub learning_rate: f64,
     /// Largest norm of the policy's gradient, > 0; longer ones are scaled down.
     pub gradient_norm_max: f64,
+    /// What a step counts for.
+    pub average: LossAverage,
     /// How the critic learns.
     pub critic: CriticSettings,
 }
@@ -36,7 +42,7 @@ pub struct LearnerSettings {
 /// What one update did.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct UpdateReport {
-    /// −mean of `A_t log p(u_t)`, per agent.
+    /// −mean of `A_t log p(u_t)`, per agent; which mean, [`LossAverage`] says.
     pub policy_loss: f64,
     /// Norm of the policy's gradient before clipping.
     pub policy_gradient_norm: f64,
@@ -202,7 +208,8 @@ impl Learner {
     /// Learns from the batch that `shards` hold, and books the time that it takes.
     ///
     /// # Equation
-    /// `∇J = 1 / (N Σ_b T_b) Σ_{b,t} A_{bt} ∇ log p(u_{bt})` (eq. 6), then one step of the optimiser.
+    /// `∇J = 1/N Σ_{b,t} w_{bt} A_{bt} ∇ log p(u_{bt})` (eq. 6), then one step of the optimiser; `w` are the weights of
+    /// [`LossAverage`], `1 / Σ_b T_b` unless something else is asked for.
     ///
     /// # Errors
     /// [`NotFinite`] if a number of the critic's sweep, an advantage, a gradient, or a number after the step is not finite.
@@ -218,7 +225,7 @@ impl Learner {
         self.reached = Reached::Critic;
         let critic = self.critic.sweep(&episodes, &mut self.advantage_bt)?;
         stopwatch.lap(Phase::Critic);
-        let stepped = self.policy_step(policy, shards, steps, stopwatch);
+        let stepped = self.policy_step(policy, shards, stopwatch);
         let (policy_gradient_norm, objective) = match stepped {
             Ok(stepped) => stepped,
             Err(broken) => {
@@ -243,12 +250,11 @@ impl Learner {
         &mut self,
         policy: &dyn Policy,
         shards: Vec<&mut ShardBatch>,
-        steps: usize,
         stopwatch: &mut Stopwatch,
     ) -> Result<(f64, f64), NotFinite> {
         check_advantages(&self.advantage_bt)?;
         self.reached = Reached::Gradient;
-        let objective = self.backward(shards, steps);
+        let objective = self.backward(shards);
         stopwatch.lap(Phase::Backward);
         if !objective.is_finite() {
             return Err(NotFinite::new(
@@ -271,12 +277,15 @@ impl Learner {
     }
 
     /// Computes the gradient of −J into the first shard's gradient and returns J.
-    fn backward(&mut self, shards: Vec<&mut ShardBatch>, steps: usize) -> f64 {
+    fn backward(&mut self, shards: Vec<&mut ShardBatch>) -> f64 {
         let parameters = self.parameters.len();
         self.shard_gradients
             .resize_with(shards.len(), || vec![0.0; parameters]);
         // Descending on −J: the weights carry the minus sign and the mean over steps and agents.
-        let scale = -1.0 / (steps * self.agents) as f32;
+        let steps_b: Vec<usize> = self.advantage_bt.iter().map(Vec::len).collect();
+        let scale_t: Vec<f32> = (self.settings.average.weight_t(&steps_b).into_iter())
+            .map(|weight| -weight / self.agents as f32)
+            .collect();
         let mut rest = self.advantage_bt.as_slice();
         let mut work: Vec<ShardWork<'_>> = shards
             .into_iter()
@@ -284,8 +293,10 @@ impl Learner {
             .map(|(batch, gradient)| {
                 let (own, others) = rest.split_at(batch.episodes.len());
                 rest = others;
-                let scaled =
-                    |advantage_t: &Vec<f32>| advantage_t.iter().map(|a| scale * a).collect();
+                let scaled = |advantage_t: &Vec<f32>| {
+                    let steps = advantage_t.iter().zip(&scale_t);
+                    steps.map(|(a, scale)| scale * a).collect()
+                };
                 let weight_bt = own.iter().map(scaled).collect();
                 ShardWork {
                     batch,

@@ -42,6 +42,7 @@ fn settings() -> LearnerSettings {
         optimiser: OptimiserKind::ADAM,
         learning_rate: 1e-3,
         gradient_norm_max: 10.0,
+        average: LossAverage::Steps,
         critic: CriticSettings {
             hidden: 5,
             optimiser: OptimiserKind::ADAM,

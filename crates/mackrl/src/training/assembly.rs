@@ -164,6 +164,7 @@ pub fn learner(config: &Config) -> LearnerSettings {
         optimiser,
         learning_rate: settings.learning_rate,
         gradient_norm_max: settings.gradient_norm_max,
+        average: config.learner.loss_average,
         critic: CriticSettings {
             hidden: config.policy.hidden,
             optimiser,

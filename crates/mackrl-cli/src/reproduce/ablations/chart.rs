@@ -41,11 +41,7 @@ pub(super) fn chart(report: &AblationReport) -> SmallMultiples {
 fn note(variant: &VariantReport) -> String {
     variant.versus_mackrl.map_or_else(String::new, |versus| {
         let sign = if versus.difference < 0.0 { '−' } else { '+' };
-        format!(
-            "{sign}{:.2} ± {:.2}",
-            versus.difference.abs(),
-            versus.error
-        )
+        format!("{sign}{:.2} ± {:.2}", versus.difference.abs(), versus.error)
     })
 }
 
