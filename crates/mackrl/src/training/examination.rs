@@ -225,7 +225,9 @@ impl Trainer {
         if learner.reached() >= Reached::Step {
             tensors.add(Part::Step, &learner.after_step(&*self.policy), None);
         }
-        learnt
+        learnt?;
+        self.row_of_batch();
+        Ok(())
     }
 }
 

@@ -143,14 +143,9 @@ impl Trainer {
         if self.is_test_due() {
             return self.test().map(Some);
         }
-        self.learn()?;
-        if self.steps_env >= self.config.run.steps_env {
-            self.next_test = self.steps_env;
-        }
-        if self.steps_env < self.next_row || self.steps_env >= self.next_test {
-            return Ok(None);
-        }
-        Ok(Some(self.row()))
+        self.play()?;
+        self.learn_from_batch()?;
+        Ok(self.row_of_batch())
     }
 
     /// The weights of the policy and of the critic as safetensors.
@@ -261,12 +256,6 @@ impl Trainer {
         schedule.start + (schedule.finish - schedule.start) * progress
     }
 
-    /// Plays a batch of training episodes and learns from it.
-    fn learn(&mut self) -> Result<(), Error> {
-        self.play()?;
-        self.learn_from_batch()
-    }
-
     /// Plays a batch of training episodes.
     pub(super) fn play(&mut self) -> Result<(), Error> {
         let settings = RolloutSettings {
@@ -304,6 +293,15 @@ impl Trainer {
         self.interval.note_update(&report, exploration);
         self.interval.tally.merge(&self.rollout.tally());
         Ok(())
+    }
+
+    /// The row that is due after a batch, if one is; a test, which is due after the last batch, gives its own.
+    pub(super) fn row_of_batch(&mut self) -> Option<MetricRow> {
+        if self.steps_env >= self.config.run.steps_env {
+            self.next_test = self.steps_env;
+        }
+        let is_due = self.steps_env >= self.next_row && !self.is_test_due();
+        is_due.then(|| self.row())
     }
 
     /// Episodes of a batch.
