@@ -85,3 +85,32 @@ fn a_chart_without_data_is_still_drawn() {
     assert!(empty.to_svg().contains("steps"), "the axes have no words");
     assert!(!empty.to_png().unwrap().is_empty());
 }
+
+#[test]
+fn small_multiples_have_a_panel_each_and_one_legend() {
+    let panel = |title: &str| Multiple {
+        title: title.into(),
+        note: "+0.10 ± 0.05".into(),
+        series: chart(Mark::Line, 0.1).series,
+    };
+    let multiples = SmallMultiples {
+        title: "Parts".into(),
+        subtitle: String::new(),
+        x_axis: chart(Mark::Line, 0.0).x_axis,
+        y_axis: chart(Mark::Line, 0.0).y_axis,
+        columns: 2,
+        panels: ["first", "second", "third"].map(panel).to_vec(),
+    };
+    let svg = multiples.to_svg();
+    let count = |text: &str| svg.matches(text).count();
+    assert_eq!(count("<clipPath"), 3);
+    assert_eq!([count(">first<"), count(">third<")], [1, 1]);
+    assert_eq!(count("+0.10 ± 0.05"), 3);
+    assert_eq!(count(">ours<"), 1, "the legend");
+    assert_eq!(
+        count(">0.50<"),
+        2,
+        "labels stand at the first panel of a row"
+    );
+    assert!(!multiples.to_png().unwrap().is_empty());
+}

@@ -30,6 +30,7 @@ use crate::{
     provenance::Provenance,
     recorded::{TrainingRun, final_mean},
 };
+use claims::Finals;
 use variants::{Variant, variants};
 
 /// Show where MACKRL's gain comes from: one plot of nine learners that differ in one thing each.
@@ -169,7 +170,11 @@ fn report(
         map: map.to_owned(),
         seeds: options.seeds,
         steps: options.steps_of(tests.max().unwrap_or(0)),
-        claims: claims::claims(&finals_of("always-delegate"), &finals_of("central-v")),
+        claims: claims::claims(&Finals {
+            mackrl,
+            central_v: finals_of("central-v"),
+            always_delegate: finals_of("always-delegate"),
+        }),
         variants,
     }
 }
@@ -231,16 +236,23 @@ mod tests {
         // 0.1 is less than two standard errors of 0.071.
         assert!(claim.holds, "{claim:?}");
         assert!(claim.evidence.contains("-0.100 ± 0.071"), "{claim:?}");
+        let gain = &example().claims[1];
+        assert!(
+            gain.holds && gain.evidence.contains("+0.200 ± 0.071"),
+            "{gain:?}"
+        );
     }
 
     #[test]
-    fn the_plot_has_a_curve_for_each_variant_and_the_table_a_row() {
+    fn the_plot_has_a_panel_for_each_variant_and_the_table_a_row() {
         let report = example();
         let svg = report.chart().to_svg();
         let text = report.to_string();
         for variant in &report.variants {
-            let name = format!("{} (2)", variant.label);
-            assert!(svg.contains(&name) && text.contains(&name), "{name}");
+            let row = format!("{} (2)", variant.label);
+            assert!(svg.contains(variant.label) && text.contains(&row), "{row}");
         }
+        assert_eq!(svg.matches("<clipPath").count(), 8);
+        assert!(svg.contains("−0.30 ± 0.07"), "{svg}");
     }
 }
