@@ -52,7 +52,11 @@ fn finished_runs_are_used_again_and_jobs_change_nothing() {
     assert_eq!(first["steps"], serde_json::json!([0, 1000, 2000]));
     assert_eq!(first["panels"][1]["map"], "2s3z");
     assert_eq!(first["panels"][0]["mackrl"]["runs"], 2);
-    assert_eq!(first["claims"].as_array().map(Vec::len), Some(5));
+    assert_eq!(
+        first["claims"].as_array().map(Vec::len),
+        Some(8),
+        "five of the paper, three aims"
+    );
     for name in [
         "figure6.json",
         "figure6-3m.svg",
@@ -64,6 +68,11 @@ fn finished_runs_are_used_again_and_jobs_change_nothing() {
 
     let delegation = report(&reproduce("figure7", folder.path(), "2"));
     assert_eq!(delegation["moments"].as_array().map(Vec::len), Some(4));
+    // The first batch: an untrained pair that knows all enemies has one of very many actions to choose.
+    let untrained = &delegation["moments"][0];
+    assert_eq!(untrained["steps"], 0);
+    let rate = untrained["rates"][5]["mean"].as_f64();
+    assert!(rate.is_some_and(|rate| rate < 0.15), "{untrained}");
     assert_eq!(report(&reproduce("figure6", folder.path(), "2")), first);
     assert_eq!(written(folder.path()), files, "a finished run was repeated");
 
