@@ -39,4 +39,5 @@ pub use settings::Setting;
 pub use crate::{
     common_knowledge::CommonKnowledgeFeatures,
     hierarchy::{Delegation, Selection},
+    learner::LossAverage,
 };

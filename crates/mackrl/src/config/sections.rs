@@ -7,12 +7,11 @@ use mackrl_env::{
 use serde::{Deserialize, Serialize};
 
 use crate::config::{
-    Algorithm, CommonKnowledgeFeatures, ConfigError, Delegation, EnvironmentConfig, OptimiserKind,
-    Origin, PartitionChoice, Selection, Setting,
+    Algorithm, CommonKnowledgeFeatures, ConfigError, Delegation, EnvironmentConfig, LossAverage,
+    OptimiserKind, Origin, PartitionChoice, Selection, Setting,
     error::{nearest, shortened},
     settings::in_section,
 };
-use crate::learner::LossAverage;
 
 /// Everything that determines the result of a run.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
