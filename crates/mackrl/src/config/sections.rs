@@ -239,13 +239,15 @@ impl Config {
             .cloned()
     }
 
-    /// The same settings as a table.
+    /// The same settings as a table. Numbers are those that a reader of the file sees: 0.02, not the nearest number of single
+    /// precision.
     ///
     /// # Panics
     /// If an integer is beyond 2⁶³, which [`Config::validate`] refuses.
     #[must_use]
     pub fn to_table(&self) -> toml::Table {
-        toml::Table::try_from(self).expect("a valid configuration is a table")
+        let text = self.to_toml();
+        toml::from_str(&text).expect("what was written can be read")
     }
 
     /// The same settings as TOML, in the order of declaration.

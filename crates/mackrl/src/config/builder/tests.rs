@@ -300,3 +300,11 @@ fn large_teams_take_turns_unless_something_else_is_asked_for() {
         "whoever asks for all is told why not"
     );
 }
+
+#[test]
+fn numbers_of_single_precision_read_as_they_are_written() {
+    let scatter = Config::default().get("env.spawn_scatter");
+    assert_eq!(scatter, Some(toml::Value::Float(0.02)));
+    let set = ConfigBuilder::new().set("env.spawn_scatter=0.3").unwrap();
+    assert_eq!(set.build().unwrap().env.settings.spawn_scatter, 0.3);
+}
