@@ -18,7 +18,7 @@ const WIDTH: u16 = 960;
 /// Height of the plotting area of one panel.
 const PANEL_HEIGHT: f64 = 150.0;
 /// Between two panels side by side.
-const GAP: f64 = 24.0;
+const GAP: f64 = 34.0;
 /// Above a panel, for its title and note.
 const HEAD: f64 = 44.0;
 
