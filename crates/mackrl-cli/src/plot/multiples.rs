@@ -10,7 +10,7 @@ use super::{
         widest_label, words,
     },
     png,
-    scene::{Direction, Panel, Rectangle, Scene, Shape, Weight, Words},
+    scene::{Direction, Panel, Rectangle, Scene, Shape, Weight, Words, pixels},
     svg, text,
 };
 
@@ -159,13 +159,4 @@ impl SmallMultiples {
         }
         shapes
     }
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a picture has at most a few thousand pixels"
-)]
-const fn pixels(length: f64) -> u16 {
-    length as u16
 }

@@ -113,3 +113,13 @@ pub(super) enum Weight {
 
 /// Dash and gap of dashed lines.
 pub(super) const DASHES: [f32; 2] = [5.0, 3.5];
+
+/// An edge of a picture that has room for `length`.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a picture has fewer than 65 536 pixels along an edge"
+)]
+pub(super) fn pixels(length: f64) -> u16 {
+    length.ceil() as u16
+}

@@ -6,7 +6,7 @@ use super::{
     legend, lens,
     marks::{bars, body, circle, closed, cross, filled, link, name_tag, open, words},
 };
-use crate::plot::scene::{Panel, Rectangle, Scene, Shape, Weight};
+use crate::plot::scene::{Panel, Rectangle, Scene, Shape, Weight, pixels};
 
 /// Width in pixels that the arena is fitted to.
 const WIDTH: f64 = 840.0;
@@ -190,13 +190,4 @@ pub(super) fn wedge([point, base]: [[f64; 2]; 2], half_width: f64) -> Option<[[f
         [base[0] + side[0], base[1] + side[1]],
         [base[0] - side[0], base[1] - side[1]],
     ])
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a picture has fewer than 65 536 pixels along an edge"
-)]
-fn pixels(length: f64) -> u16 {
-    length.ceil() as u16
 }
