@@ -9,6 +9,8 @@ log-softmax over the available columns, the loss a weighted sum of log-probabili
 of the gradient's norm, Adam. Each peer runs as it is fastest: PyTorch its GRU over whole episodes and JAX `lax.scan` under
 `jit`, with all products that do not wait for the recurrence done at once. `mackrl` goes through the forward pass step by
 step, because an actor must: what a team sees at a step depends on what it did before.
+
+The last line says how far anybody could get: the update's matrix products alone, at the rate of one large product.
 """
 
 import argparse
@@ -72,6 +74,9 @@ def compare(arguments):
         result["ratio"] = result["min_ms"] / ours
         version = result.get("version", "")
         print(f"{name:10}{result['min_ms']:9.2f}{result['median_ms']:11.2f}{result['ratio']:8.2f}  {version}")
+    rate, work = results["pytorch"]["product_gflop_per_s"], results["mackrl"]["gflop"]
+    floor = 1e3 * work / rate
+    print(f"floor {floor:.1f} ms: {work:.2f} GFLOP at the {rate:.0f} GFLOP/s of a large product in PyTorch on this core; mackrl reaches {floor / ours:.0%} of that")
     if arguments.json:
         Path(arguments.json).write_text(json.dumps(results, indent=2) + "\n")
 
@@ -131,7 +136,14 @@ def pytorch(rows, steps, updates):
         torch.nn.utils.clip_grad_norm_(parameters, 10.0)
         optimiser.step()
 
-    return {"version": torch.__version__, **clocked(update, updates)}
+    return {"version": torch.__version__, **clocked(update, updates), "product_gflop_per_s": product_rate(torch)}
+
+
+def product_rate(torch, size=1024):
+    """What one core reaches where nothing but a large matrix product is asked of it."""
+    left, right = torch.randn(size, size), torch.randn(size, size)
+    best_s = 1e-3 * clocked(lambda: left @ right, 50)["min_ms"]
+    return 2e-9 * size**3 / best_s
 
 
 def jax(rows, steps, updates):
