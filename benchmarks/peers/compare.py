@@ -16,6 +16,7 @@ The last line says how far anybody could get: the update's matrix products alone
 import argparse
 import json
 import os
+import shutil
 import statistics
 import subprocess
 import sys
@@ -54,6 +55,8 @@ def install():
 
 
 def compare(arguments):
+    if not shutil.which(arguments.mackrl):
+        sys.exit(f"{arguments.mackrl} is no program; `cargo build --release` makes one, --mackrl names another")
     size = ["--rows", str(arguments.rows), "--steps", str(arguments.steps), "--updates", str(arguments.updates)]
     python = ENVIRONMENT / "bin" / "python"
     commands = {"mackrl": [arguments.mackrl, "bench", "update", "--json", *size]}
