@@ -68,12 +68,16 @@ struct Subject {
 
 impl Subject {
     fn new(settings: LearnerSettings) -> Self {
+        Self::playing(settings, [0, 1])
+    }
+
+    fn playing(settings: LearnerSettings, episodes: [u64; 2]) -> Self {
         let environment = || Config::default().env.make().unwrap();
         let spec = environment().spec().clone();
         let policy = CentralV::new(&spec, 5);
         let learner = Learner::new(&policy, [spec.agents, spec.state_size], settings, 1, 1);
         let mut rollout = Rollout::new(&policy, vec![environment(), environment()], 2, 1);
-        let keys = [0, 1].map(|episode| EpisodeKey::new(1, Stream::Training, episode));
+        let keys = episodes.map(|episode| EpisodeKey::new(1, Stream::Training, episode));
         let behaviour = RolloutSettings {
             behaviour: Behaviour::sampled(0.5),
             recording: Recording::ForLearning,
@@ -243,4 +247,22 @@ fn a_logit_that_is_not_finite_is_named_before_anybody_acts() {
         played.unwrap_err().to_string(),
         "logits of agent_controller is NaN at episode 0, step 0, agent 0, column 0"
     );
+}
+
+#[test]
+fn the_average_decides_what_steps_count_for_and_nothing_else() {
+    let [steps, slots] = [LossAverage::Steps, LossAverage::Slots].map(|average| {
+        let settings = LearnerSettings {
+            average,
+            ..settings()
+        };
+        let mut subject = Subject::playing(settings, [0, 2]);
+        let batch = subject.rollout.batches().next().unwrap();
+        let lengths: Vec<usize> = batch.episodes.iter().map(Episode::steps).collect();
+        assert_ne!(lengths[0], lengths[1], "episodes of one length count alike");
+        subject.update().unwrap()
+    });
+    assert_ne!(steps.policy_gradient_norm, slots.policy_gradient_norm);
+    assert_eq!(steps.critic, slots.critic);
+    assert_eq!(steps.advantage_mean, slots.advantage_mean);
 }
