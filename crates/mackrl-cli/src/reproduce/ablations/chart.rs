@@ -1,7 +1,7 @@
 //! The ablations as a chart: a panel for each variant, with MACKRL in all of them.
 
 use super::{AblationReport, VariantReport};
-use crate::plot::{Axis, Colour, Mark, Multiple, Point, Series, SmallMultiples};
+use crate::plot::{Axis, Colour, Mark, Multiple, Series, SmallMultiples};
 
 /// Panels side by side.
 const COLUMNS: usize = 4;
@@ -46,13 +46,10 @@ fn note(variant: &VariantReport) -> String {
 }
 
 fn series(report: &AblationReport, variant: &VariantReport, name: &str, colour: Colour) -> Series {
-    let tests = (variant.curve.mean.iter().zip(&variant.curve.sem)).zip(&report.steps);
     Series {
         name: Some(name.to_owned()),
         colour,
         mark: Mark::Line,
-        points: tests
-            .map(|((&mean, &error), &step)| Point::with_error(step as f64, mean, error))
-            .collect(),
+        points: variant.curve.points(&report.steps),
     }
 }

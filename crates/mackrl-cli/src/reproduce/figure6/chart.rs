@@ -12,7 +12,7 @@ pub(super) fn chart(panel: &Panel, steps: &[u64]) -> LineChart {
         name: Some(format!("{} ({})", learner.name(), curve.runs)),
         colour,
         mark: Mark::Line,
-        points: measured(steps, curve),
+        points: curve.points(steps),
     };
     let last = steps.last().copied().unwrap_or(0);
     let rings = |name: Option<&str>, colour, values: &[f64]| Series {
@@ -46,12 +46,6 @@ fn emptiest_corner(panel: &Panel) -> Corner {
     } else {
         Corner::UpperLeft
     }
-}
-
-fn measured(steps: &[u64], curve: &Curve) -> Vec<Point> {
-    (steps.iter().zip(curve.mean.iter().zip(&curve.sem)))
-        .map(|(&step, (&y, &error))| Point::with_error(step as f64, y, error))
-        .collect()
 }
 
 /// Published points up to the last step that is shown.

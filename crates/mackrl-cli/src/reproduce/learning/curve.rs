@@ -3,6 +3,8 @@
 use mackrl::statistics::mean_and_standard_error;
 use serde::{Deserialize, Serialize};
 
+use crate::plot::Point;
+
 /// Means with their standard errors, one entry per test.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Curve {
@@ -41,6 +43,14 @@ impl Curve {
             sem,
             runs: runs.len(),
         }
+    }
+
+    /// The curve over the environment steps of its tests, with a band of one standard error.
+    #[must_use]
+    pub(crate) fn points(&self, steps: &[u64]) -> Vec<Point> {
+        (steps.iter().zip(self.mean.iter().zip(&self.sem)))
+            .map(|(&step, (&mean, &error))| Point::with_error(step as f64, mean, error))
+            .collect()
     }
 }
 
