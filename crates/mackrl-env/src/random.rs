@@ -83,8 +83,8 @@ impl EpisodeKey {
         let unit = |high: u32, low: u32| {
             ((u64::from(high) << 32 | u64::from(low)) >> 11) as f64 / (1_u64 << 53) as f64
         };
-        let radius = (-2.0 * (1.0 - unit(a, b)).ln()).sqrt();
-        radius * (std::f64::consts::TAU * unit(c, d)).cos()
+        let radius = (-2.0 * libm::log(1.0 - unit(a, b))).sqrt();
+        radius * libm::cos(std::f64::consts::TAU * unit(c, d))
     }
 
     /// The generator's four output words for this name.

@@ -1,10 +1,16 @@
 //! The two kinds of real number: `f32` in networks, `f64` in oracles and tests.
+//!
+//! Exponentials and logarithms are never those of the platform's library, whose last bits differ from machine to machine: a
+//! choice is drawn from them, and two agents on different machines must draw the same one.
 
 use std::{
+    convert::identity,
     fmt::Debug,
     iter::Sum,
     ops::{Add, AddAssign, Div, Mul, MulAssign, Neg, Sub, SubAssign},
 };
+
+use crate::nn::elementary;
 
 /// A floating-point number.
 pub trait Real:
@@ -59,7 +65,7 @@ pub trait Real:
 }
 
 macro_rules! real {
-    ($float:ty, $from:expr) => {
+    ($float:ty, $from:expr, $exp:expr, $ln:expr) => {
         impl Real for $float {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
@@ -72,10 +78,10 @@ macro_rules! real {
                 f64::from(self)
             }
             fn exp(self) -> Self {
-                self.exp()
+                $exp(self)
             }
             fn ln(self) -> Self {
-                self.ln()
+                $ln(self)
             }
             #[inline(always)]
             fn sqrt(self) -> Self {
@@ -106,5 +112,5 @@ const fn to_f32(value: f64) -> f32 {
     value as f32
 }
 
-real!(f32, to_f32);
-real!(f64, std::convert::identity);
+real!(f32, to_f32, elementary::exp_one, elementary::ln_one);
+real!(f64, identity, libm::exp, libm::log);

@@ -18,7 +18,7 @@ use super::{
     thought,
 };
 use crate::{
-    NotFinite, Phase, Stopwatch,
+    NotFinite, Phase, Real, Stopwatch,
     common_knowledge::common_knowledge,
     marginalisation::{MarginalGradient, log_likelihood_with_gradient},
     nn::Named,
@@ -552,7 +552,7 @@ impl World {
 
 /// The log-probabilities of `count` equally likely choices.
 fn uniform(count: usize) -> Vec<f32> {
-    vec![0.0 - (count as f32).ln(); count]
+    vec![0.0 - Real::ln(count as f32); count]
 }
 
 /// The entities of `known` as `member` sees them in environment `b`.

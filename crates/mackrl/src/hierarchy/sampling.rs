@@ -8,6 +8,7 @@ use mackrl_env::{Action, AgentId, Draw, EpisodeKey};
 
 use crate::{
     Real,
+    nn::{Element, elementary::exponentials},
     partition::Pair,
     policy::{DELEGATE, Mode, PolicyShape, PolicyTable},
 };
@@ -50,7 +51,7 @@ impl Sampler {
     /// # Panics
     /// If no entry of the row is available.
     #[must_use]
-    pub fn choose_partition<F: Real>(&self, log_p_p: &[F]) -> usize {
+    pub fn choose_partition<F: Element>(&self, log_p_p: &[F]) -> usize {
         self.choose(log_p_p, Draw::Selector)
     }
 
@@ -70,7 +71,7 @@ impl Sampler {
     /// # Panics
     /// If no entry of the row is available.
     #[must_use]
-    pub fn choose_pair<F: Real>(
+    pub fn choose_pair<F: Element>(
         &self,
         pair: Pair,
         shape: PolicyShape,
@@ -93,7 +94,7 @@ impl Sampler {
     /// # Panics
     /// If no entry of the row is available.
     #[must_use]
-    pub fn choose_action<F: Real>(&self, agent: AgentId, log_p_a: &[F]) -> Action {
+    pub fn choose_action<F: Element>(&self, agent: AgentId, log_p_a: &[F]) -> Action {
         Action::new(self.choose(log_p_a, Draw::Agent(agent.index())))
     }
 
@@ -105,7 +106,7 @@ impl Sampler {
     ///
     /// # Panics
     /// If `actions_n` has not N elements, or a row that is asked has no available entry.
-    pub fn sample<F: Real>(
+    pub fn sample<F: Element>(
         &self,
         table: &PolicyTable<'_, F>,
         actions_n: &mut [Action],
@@ -119,7 +120,7 @@ impl Sampler {
     ///
     /// # Panics
     /// As [`Self::sample`], or if there is no such partition.
-    pub fn sample_within<F: Real>(
+    pub fn sample_within<F: Element>(
         &self,
         partition: usize,
         table: &PolicyTable<'_, F>,
@@ -152,7 +153,7 @@ impl Sampler {
         }
     }
 
-    fn choose<F: Real>(&self, log_p: &[F], draw: Draw) -> usize {
+    fn choose<E: Element>(&self, log_p: &[E], draw: Draw) -> usize {
         match self.mode {
             Mode::Sampled => invert(log_p, self.key.uniform(self.step, draw)),
             Mode::Greedy => most_probable(log_p),
@@ -164,15 +165,20 @@ impl Sampler {
 /// one if rounding keeps the total below it.
 ///
 /// The sum runs in `f64` and in the order of indices, so it is the same for all who hold the same row.
-fn invert<F: Real>(log_p: &[F], uniform: f64) -> usize {
+fn invert<E: Element>(log_p: &[E], uniform: f64) -> usize {
+    const PART: usize = 16;
     let mut cumulative = 0.0;
     let mut last_available = None;
-    for (index, &log_p) in log_p.iter().enumerate() {
-        if log_p > F::NEG_INFINITY {
-            cumulative += log_p.to_f64().exp();
-            last_available = Some(index);
-            if cumulative > uniform {
-                break;
+    for (part, log_p) in log_p.chunks(PART).enumerate() {
+        let mut p = [E::ZERO; PART];
+        exponentials(log_p, &mut p[..log_p.len()]);
+        for (place, (&log_p, p)) in log_p.iter().zip(p).enumerate() {
+            if log_p > E::NEG_INFINITY {
+                cumulative += p.to_f64();
+                last_available = Some(part * PART + place);
+                if cumulative > uniform {
+                    return part * PART + place;
+                }
             }
         }
     }

@@ -9,6 +9,8 @@
 
 use pulp::Simd;
 
+use super::lanes::{BLOCK, Element, Kernel, Lanes};
+
 /// 1.5 · 2²³: adding it rounds a number of at most 22 bits to an integer, which then stands in the low bits.
 const ROUNDING: f32 = 12_582_912.0;
 /// 2²³: its bits plus a small integer are the float 2²³ + that integer.
@@ -41,6 +43,57 @@ const EXPONENTIAL_SERIES: [f32; 6] = [
 ];
 /// 2/(2k+1) for k = 5, …, 1: the series of ln((1+s)/(1−s)) − 2s, divided by s³, in s².
 const LOGARITHM_SERIES: [f32; 5] = [2.0 / 11.0, 2.0 / 9.0, 2.0 / 7.0, 2.0 / 5.0, 2.0 / 3.0];
+
+/// eˣ of one number, as [`exp`] computes it in a vector.
+pub(crate) fn exp_one(x: f32) -> f32 {
+    let mut result = [0.0];
+    exponentials(&[x], &mut result);
+    result[0]
+}
+
+/// ln x of one number, as [`ln`] computes it in a vector.
+pub(crate) fn ln_one(x: f32) -> f32 {
+    f32::dispatch(Logarithm(x))
+}
+
+/// eˣ of every number.
+///
+/// # Shapes
+/// `x` and `result` have one length.
+pub(crate) fn exponentials<E: Element>(x: &[E], result: &mut [E]) {
+    debug_assert_eq!(x.len(), result.len(), "a result for every number");
+    E::dispatch(Exponentials { x, result });
+}
+
+struct Exponentials<'a, E> {
+    x: &'a [E],
+    result: &'a mut [E],
+}
+
+impl<E: Element> Kernel<E> for Exponentials<'_, E> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes<Element = E>>(self, lanes: L) {
+        let parts = self.x.chunks(L::LANES);
+        for (x, result) in parts.zip(self.result.chunks_mut(L::LANES)) {
+            lanes.store(result, lanes.exp(lanes.load(x)));
+        }
+    }
+}
+
+struct Logarithm(f32);
+
+impl Kernel<f32> for Logarithm {
+    type Output = f32;
+
+    #[inline(always)]
+    fn run<L: Lanes<Element = f32>>(self, lanes: L) -> f32 {
+        let mut result = [0.0; BLOCK];
+        lanes.store(&mut result, lanes.ln(lanes.splat(self.0)));
+        result[0]
+    }
+}
 
 /// eˣ: exactly 0 below −87, constant above 88.
 #[inline(always)]

@@ -224,10 +224,10 @@ impl Lanes for OneByOne {
         }
     }
     fn exp(self, x: f64) -> f64 {
-        x.exp()
+        Real::exp(x)
     }
     fn ln(self, x: f64) -> f64 {
-        x.ln()
+        Real::ln(x)
     }
     fn tanh(self, x: f64) -> f64 {
         x.tanh()

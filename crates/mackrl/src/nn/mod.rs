@@ -17,7 +17,7 @@
 
 mod aligned;
 pub mod benchmark;
-mod elementary;
+pub(crate) mod elementary;
 mod feed_forward;
 mod finite;
 mod gates;

@@ -4,6 +4,7 @@ use mackrl_env::matrix_game::{ACTIONS, AGENTS, CommonKnowledge, Deal, Observatio
 use serde::{Deserialize, Serialize};
 
 use super::game::{PayoffTable, TabularGame};
+use crate::Real;
 
 /// Number of logits: two agents × 5 observations × 5 actions, and 3 states of common knowledge × 26 choices of the pair.
 pub const PARAMETERS: usize = AGENT_PARAMETERS + CommonKnowledge::ALL.len() * CHOICES;
@@ -192,7 +193,7 @@ fn add_softmax_gradient(gradient: &mut [f64], weight: f64, policy: &[f64], value
 fn softmax<const COUNT: usize>(logit: impl Fn(usize) -> Option<f64>) -> [f64; COUNT] {
     let logits: [f64; COUNT] = std::array::from_fn(|i| logit(i).unwrap_or(f64::NEG_INFINITY));
     let largest = logits.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let weights = logits.map(|logit| (logit - largest).exp());
+    let weights = logits.map(|logit| Real::exp(logit - largest));
     let total: f64 = weights.iter().sum();
     weights.map(|weight| weight / total)
 }
