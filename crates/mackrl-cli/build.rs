@@ -12,12 +12,14 @@ use std::{
 use sha2::{Digest, Sha256};
 
 /// Folders that results come from, relative to this crate. Those that are not there, as in a packaged crate, are left out.
-const SOURCES: [&str; 5] = [
+const SOURCES: [&str; 7] = [
     "../mackrl/src",
+    "../mackrl-run/src",
+    "../mackrl-run/presets",
     "../mackrl-env/src",
-    "../../maps",
-    "../../units",
-    "../../presets",
+    "../mackrl-skirmish/src",
+    "../mackrl-skirmish/maps",
+    "../mackrl-skirmish/units",
 ];
 
 fn main() {

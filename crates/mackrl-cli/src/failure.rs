@@ -7,8 +7,8 @@ use std::{
     process::ExitCode,
 };
 
-use mackrl::config::{Config, ConfigError};
 use mackrl_env::StepError;
+use mackrl_run::config::{Config, ConfigError};
 
 use crate::provenance::CODE;
 
@@ -360,7 +360,7 @@ fn reader_has_gone(error: &anyhow::Error) -> bool {
 #[cfg(test)]
 mod tests {
     use anyhow::Context;
-    use mackrl::config::ConfigBuilder;
+    use mackrl_run::config::ConfigBuilder;
 
     use super::*;
 

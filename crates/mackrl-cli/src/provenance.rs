@@ -11,7 +11,7 @@
 //!
 //! Nothing in it depends on the clock, the machine, the folder or the number of threads: equal work has an equal provenance.
 
-use mackrl::config::{Config, EnvironmentConfig};
+use mackrl_run::config::{Config, EnvironmentConfig};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -240,12 +240,12 @@ mod tests {
     #[test]
     fn map_data_are_the_files_of_map_and_units() {
         let files = concat!(
-            include_str!("../../../maps/3m.toml"),
-            include_str!("../../../units/liberty.toml")
+            include_str!("../../mackrl-skirmish/maps/3m.toml"),
+            include_str!("../../mackrl-skirmish/units/liberty.toml")
         );
         assert_eq!(provenance(|_| ()).map_sha256, sha256(files.as_bytes()));
         let lotv = provenance(|config| {
-            config.env.settings.units = mackrl_env::skirmish::UnitData::Lotv;
+            config.env.settings.units = mackrl_skirmish::UnitData::Lotv;
         });
         assert_ne!(lotv.map_sha256, provenance(|_| ()).map_sha256);
         let game = provenance(|config| config.env.map = "matrix-game".to_owned());

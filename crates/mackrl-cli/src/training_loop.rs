@@ -2,8 +2,8 @@
 
 use std::{path::PathBuf, time::Instant};
 
-use mackrl::{
-    NotFinite,
+use mackrl::NotFinite;
+use mackrl_run::{
     config::Config,
     training::{Checkpoint, MetricRow, Trainer},
 };

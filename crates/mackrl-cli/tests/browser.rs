@@ -13,8 +13,8 @@ use std::{
 };
 
 use assert_cmd::cargo::cargo_bin;
-use mackrl::replay::{GroupKnowledge, Playback, Replay};
 use mackrl_env::{AgentId, EntityId};
+use mackrl_run::replay::{GroupKnowledge, Playback, Replay};
 
 /// Collects what goes wrong from the first line of the page on. A browser without a screen draws no frames, so they come by the
 /// clock.

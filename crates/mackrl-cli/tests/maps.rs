@@ -5,7 +5,7 @@ use std::process::Command;
 use serde_json::{Value, json};
 
 /// The table of the SMAC client.
-const SMAC_MAPS: &str = include_str!("../../mackrl-env/tests/golden/smac_maps.md");
+const SMAC_MAPS: &str = include_str!("../../mackrl-skirmish/tests/golden/smac_maps.md");
 /// Columns of the table, in their order.
 const COLUMNS: [&str; 14] = [
     "map",
@@ -121,7 +121,7 @@ fn a_terrain_that_is_shown_can_be_put_into_a_scenario() {
     let map = mackrl(&["maps", "6h_vs_8z", "--json"]);
     let lines = map["terrain"].as_array().expect("lines").iter();
     let drawing: Vec<&str> = lines.map(|line| line.as_str().expect("a line")).collect();
-    let shipped = include_str!("../../../maps/6h_vs_8z.toml");
+    let shipped = include_str!("../../mackrl-skirmish/maps/6h_vs_8z.toml");
     let own = format!("terrain = \"\"\"\n{}\n\"\"\"", drawing.join("\n"));
     let text = shipped.replace("terrain = \"arena-6h\"", &own);
     assert_ne!(text, shipped);

@@ -7,7 +7,7 @@ use std::{
 };
 
 use flate2::{Compression, read::GzDecoder, write::GzEncoder};
-use mackrl_env::skirmish::SIMULATOR_VERSION;
+use mackrl_skirmish::SIMULATOR_VERSION;
 use tempfile::TempDir;
 
 /// What came back of a command typed in `folder`: the exit code, stdout and stderr.

@@ -8,17 +8,14 @@ use std::{
 };
 
 use mackrl_env::{
-    Action, AgentId, Environment, EpisodeKey, Observations, Stream,
-    contract::check_environment,
-    registry,
-    skirmish::SkirmishSettings,
-    skirmish::{Scenario, UnitData, unit_types::UnitTypes},
+    Action, AgentId, Environment, EpisodeKey, Observations, Stream, contract::check_environment,
 };
 use mackrl_sc2::{
     adapter::{GamePool, GameSettings, Installation, StarCraft2, process::Launcher},
     lifetime,
     stand_in::install::install,
 };
+use mackrl_skirmish::{Scenario, SkirmishSettings, UnitData, unit_types::UnitTypes};
 
 /// A folder with a game that stands in, and with temporary files of its own, so that tests do not see each other's games.
 struct Place {
@@ -119,11 +116,10 @@ fn choose(observations: &Observations, agent: usize, uniform: f64) -> Action {
 #[test]
 fn every_map_is_the_simulators_to_the_bit_restarts_included() {
     let place = Place::new();
-    for map in registry::map_names() {
+    for map in mackrl_skirmish::map_names() {
         let pool = Arc::new(GamePool::new(place.settings()));
         let mut game = star_craft(map, &pool);
-        let mut skirmish =
-            registry::make_skirmish(map, &SkirmishSettings::default()).expect("a map");
+        let mut skirmish = mackrl_skirmish::make(map, &SkirmishSettings::default()).expect("a map");
         let mut shown = [0, 1].map(|_| Observations::new(skirmish.spec(), 1));
         for episode in 0..2 {
             let key = EpisodeKey::new(3, Stream::Evaluation, episode);

@@ -427,7 +427,7 @@ fn what_is_no_scenario_is_refused_at_once_whatever_it_is() {
 #[test]
 fn a_scenario_may_be_called_like_a_world_of_ours() {
     let folder = tempfile::tempdir().expect("a folder for the story");
-    let map = include_str!("../../../maps/2m_vs_1z.toml");
+    let map = include_str!("../../mackrl-skirmish/maps/2m_vs_1z.toml");
     std::fs::write(folder.path().join("matrix-game.toml"), map).expect("writable");
     let checked = type_in_folder("maps --check matrix-game.toml --json", folder.path());
     let checked: serde_json::Value =

@@ -20,9 +20,7 @@ pub mod matrix_game;
 mod observations;
 pub mod random;
 pub mod random_play;
-pub mod registry;
 pub mod settings;
-pub mod skirmish;
 
 pub use entity_set::EntitySet;
 pub use environment::{

@@ -105,7 +105,7 @@ fn nth_available(available_a: &[bool], uniform: f64) -> Action {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{registry, skirmish::SkirmishSettings};
+    use crate::matrix_game::{MatrixGame, MatrixGameSettings};
 
     #[test]
     fn only_available_actions_are_chosen_and_all_of_them() {
@@ -118,12 +118,12 @@ mod tests {
     #[test]
     fn episodes_follow_each_other_and_repeat_from_the_seed() {
         let play = |seed| {
-            let environment = registry::make("3m", &SkirmishSettings::default()).unwrap();
-            let mut play = RandomPlay::new(environment, seed);
+            let game = MatrixGame::new(MatrixGameSettings::default()).unwrap();
+            let mut play = RandomPlay::new(Box::new(game), seed);
             let steps: Vec<TimeStep> = (0..211).map(|_| play.step().unwrap()).collect();
             let ends = steps.iter().filter(|step| step.end.is_some()).count() as u64;
             assert_eq!(play.episodes(), 1 + ends);
-            assert!(ends >= 3, "an episode of 3m has at most 60 steps");
+            assert_eq!(ends, 211, "an episode of the matrix game has one step");
             steps
         };
         assert_eq!(play(7), play(7));

@@ -16,9 +16,8 @@ use base64::{Engine, engine::general_purpose::STANDARD};
 use flate2::read::GzDecoder;
 use mackrl_env::{
     Action, AgentId, Environment, EnvironmentSpec, EpisodeKey, Observations, Stream, TimeStep,
-    registry,
-    skirmish::{Encounter, Face, Skirmish, SkirmishSettings, UnitData},
 };
+use mackrl_skirmish::{Encounter, Face, Skirmish, SkirmishSettings, UnitData};
 use prost::Message;
 use serde::Deserialize;
 
@@ -89,7 +88,7 @@ impl Shown {
 }
 
 fn skirmish(map: &str) -> Skirmish {
-    registry::make_skirmish(map, &SkirmishSettings::default()).unwrap()
+    mackrl_skirmish::make(map, &SkirmishSettings::default()).unwrap()
 }
 
 fn files() -> Vec<PathBuf> {

@@ -3,7 +3,7 @@
 //! Enemies have the game's own types. The agents' units have types of their own, which do not fight unasked; each map numbers
 //! them in alphabetical order from some number on, which clients find out by the least number among them.
 
-use mackrl_env::skirmish::{Scenario, rules::Team, scenario::Recruit};
+use mackrl_skirmish::{Scenario, rules::Team, scenario::Recruit};
 
 /// Where SMAC's maps are in a folder of maps.
 pub const MAP_FOLDER: &str = "SMAC_Maps";

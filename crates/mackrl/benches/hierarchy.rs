@@ -7,13 +7,15 @@ use std::hint::black_box;
 use criterion::{Criterion, criterion_group, criterion_main};
 use mackrl::{
     common_knowledge::common_knowledge,
-    config::ConfigBuilder,
     marginalisation::{MarginalGradient, log_likelihood_with_gradient},
     partition::{Pairs, all_partitions},
     policy::{Actor, Behaviour, PolicyShape, PolicyTable, Recording, Situation, Weights},
-    training::assembly::{self, World},
 };
 use mackrl_env::{Action, Environment, EpisodeKey, Observations, Stream};
+use mackrl_run::{
+    config::ConfigBuilder,
+    training::assembly::{self, World},
+};
 
 /// Environments of a shard in training.
 const ENVIRONMENTS: usize = 4;

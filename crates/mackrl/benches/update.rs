@@ -5,14 +5,16 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use mackrl::{
     Stopwatch,
-    config::Config,
     learner::Learner,
     nn::benchmark::UpdateProbe,
     policy::{Behaviour, Recording},
     rollout::{Rollout, RolloutSettings},
-    training::assembly::{self, World},
 };
 use mackrl_env::{EpisodeKey, Stream};
+use mackrl_run::{
+    config::Config,
+    training::assembly::{self, World},
+};
 
 const STEPS: usize = 60;
 const ENVIRONMENTS: usize = 8;

@@ -1,7 +1,7 @@
 //! You will see a pair learn to earn more than a joint learner can: it acts jointly on common knowledge, and delegates without.
 #![expect(clippy::print_stdout, reason = "an example shows what it found")]
 
-use mackrl::{config::ConfigBuilder, training::Trainer};
+use mackrl_run::{config::ConfigBuilder, training::Trainer};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let settings = [

@@ -1,12 +1,12 @@
 //! You will see each agent of a team, alone with its own views and the shared seed, choose what the central run chooses for it.
 #![expect(clippy::print_stdout, reason = "an example shows what it found")]
 
-use mackrl::{
+use mackrl::policy::{Behaviour, Recording, Situation};
+use mackrl_env::{Action, AgentId, EpisodeKey, Observations, Stream};
+use mackrl_run::{
     config::ConfigBuilder,
-    policy::{Behaviour, Recording, Situation},
     training::assembly::{self, World},
 };
-use mackrl_env::{Action, AgentId, EpisodeKey, Observations, Stream};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let config = ConfigBuilder::new().set("env.map=3m")?.build()?;

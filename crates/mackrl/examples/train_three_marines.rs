@@ -1,7 +1,7 @@
 //! You will see a team of three marines learn to beat three others, within a minute or so of games and seconds of yours.
 #![expect(clippy::print_stdout, reason = "an example shows what it found")]
 
-use mackrl::{config::ConfigBuilder, training::Trainer};
+use mackrl_run::{config::ConfigBuilder, training::Trainer};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let config = ConfigBuilder::new()

@@ -2,16 +2,14 @@
 #![expect(clippy::print_stdout, reason = "an example shows what it found")]
 
 use mackrl::{common_knowledge::common_knowledge, partition::Pairs};
-use mackrl_env::{
-    Action, AgentId, EntitySet, Environment, EpisodeKey, Observations, Stream, registry,
-    skirmish::{
-        Skirmish, SkirmishSettings,
-        scripted::{ScriptedPolicy, ScriptedTeam},
-    },
+use mackrl_env::{Action, AgentId, EntitySet, Environment, EpisodeKey, Observations, Stream};
+use mackrl_skirmish::{
+    Skirmish, SkirmishSettings,
+    scripted::{ScriptedPolicy, ScriptedTeam},
 };
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let mut world = registry::make_skirmish("2s3z", &SkirmishSettings::default())?;
+    let mut world = mackrl_skirmish::make("2s3z", &SkirmishSettings::default())?;
     let agents = world.spec().agents;
     let observations = after_some_steps(&mut world, 20)?;
     let visible_n = observations.visible(0);

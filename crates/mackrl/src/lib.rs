@@ -13,7 +13,6 @@
 pub mod baselines;
 pub mod central_critic;
 pub mod common_knowledge;
-pub mod config;
 pub mod decentralised;
 mod error;
 pub mod hierarchy;
@@ -24,12 +23,10 @@ mod parallel;
 pub mod partition;
 pub mod policy;
 mod real;
-pub mod replay;
 pub mod rollout;
 pub mod statistics;
 mod stopwatch;
 pub mod tabular;
-pub mod training;
 
 pub use error::{Broken, Error, Moment, NotFinite};
 pub use real::Real;

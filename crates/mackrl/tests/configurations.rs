@@ -2,12 +2,12 @@
 
 use std::ops::Bound::{self, Excluded, Included, Unbounded};
 
-use mackrl::{
-    Error,
+use mackrl::Error;
+use mackrl_env::settings::Accepts;
+use mackrl_run::{
     config::{Config, ConfigBuilder, ConfigError, Origin, presets},
     training::Trainer,
 };
-use mackrl_env::settings::Accepts;
 use proptest::prelude::*;
 
 /// Settings that decide how long a run takes, with the most that a test can wait for.

@@ -3,12 +3,14 @@
 mod support;
 
 use mackrl::{
-    config::Config,
     policy::{Behaviour, Recording},
     rollout::{Episode, RolloutSettings},
-    training::{Evaluation, Trainer, evaluate},
 };
 use mackrl_env::EpisodeKey;
+use mackrl_run::{
+    config::Config,
+    training::{Evaluation, Trainer, evaluate},
+};
 use support::team::{Team, config, keys};
 
 /// What a run leaves behind: its metrics as JSON without `sys/`, its weights, and how they play.

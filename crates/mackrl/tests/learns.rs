@@ -4,12 +4,12 @@ mod support;
 
 use std::num::NonZeroUsize;
 
-use mackrl::{
+use mackrl::tabular::{Learner, SweepSettings, sweep};
+use mackrl_env::matrix_game::{ObservationDistribution, Payoffs};
+use mackrl_run::{
     config::Config,
-    tabular::{Learner, SweepSettings, sweep},
     training::{Evaluation, Trainer, evaluate},
 };
-use mackrl_env::matrix_game::{ObservationDistribution, Payoffs};
 use support::team::config;
 
 /// Trains to the end and plays `episodes` greedy episodes that training has not seen.

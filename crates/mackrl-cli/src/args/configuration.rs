@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
-use mackrl::config::{ConfigBuilder, ConfigError, EnvironmentConfig};
-use mackrl_env::skirmish::custom::LENGTH_MAX;
+use mackrl_run::config::{ConfigBuilder, ConfigError, EnvironmentConfig};
+use mackrl_skirmish::custom::LENGTH_MAX;
 
 use crate::bounded;
 

@@ -6,7 +6,7 @@ use std::{
 };
 
 use clap::{Args, ValueEnum};
-use mackrl_env::skirmish::scripted::ScriptedPolicy;
+use mackrl_skirmish::scripted::ScriptedPolicy;
 
 use crate::args::runs::ThreadsArgs;
 

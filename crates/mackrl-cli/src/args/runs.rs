@@ -198,7 +198,10 @@ mod tests {
         );
         let config = args.configuration.layers().unwrap().build().unwrap();
         assert_eq!(config.env.map, "2s3z");
-        assert_eq!(config.policy.algorithm, mackrl::config::Algorithm::CentralV);
+        assert_eq!(
+            config.policy.algorithm,
+            mackrl_run::config::Algorithm::CentralV
+        );
         assert_eq!((config.run.steps_env, config.run.seed), (9, 4));
         assert_eq!(config.learner.gamma, 0.5);
         assert_eq!(args.threads.count(), 3);

@@ -7,10 +7,8 @@ use std::{
 };
 
 use anyhow::Context;
-use mackrl::{
-    decentralised::{AgentLink, Answer, Certificate, Request, Subject},
-    training::{assembly, read_weights},
-};
+use mackrl::decentralised::{AgentLink, Answer, Certificate, Request, Subject};
+use mackrl_run::training::{assembly, read_weights};
 use serde_json::Value;
 
 use crate::{

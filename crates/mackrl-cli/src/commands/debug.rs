@@ -6,10 +6,8 @@ use std::{
 };
 
 use anyhow::Context;
-use mackrl::{
-    NotFinite,
-    training::{Examination, Part, TensorStatistics, Trainer},
-};
+use mackrl::NotFinite;
+use mackrl_run::training::{Examination, Part, TensorStatistics, Trainer};
 use serde::Serialize;
 
 use crate::{

@@ -6,13 +6,13 @@ use std::{
 };
 
 use anyhow::Context;
-use mackrl::{
+use mackrl::policy::Behaviour;
+use mackrl_env::{EpisodeKey, Stream};
+use mackrl_run::{
     config::Engine,
-    policy::Behaviour,
     replay::record_policy,
     training::{Episodes, Evaluation, evaluate_in},
 };
-use mackrl_env::{EpisodeKey, Stream};
 use serde_json::Value;
 
 use crate::{

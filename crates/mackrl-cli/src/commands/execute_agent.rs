@@ -2,14 +2,12 @@
 
 use std::io;
 
-use mackrl::{
-    decentralised::serve_agent,
-    training::{
-        assembly::{self, World},
-        read_weights,
-    },
-};
+use mackrl::decentralised::serve_agent;
 use mackrl_env::AgentId;
+use mackrl_run::training::{
+    assembly::{self, World},
+    read_weights,
+};
 
 use crate::{args::ExecuteAgentArgs, failure::Failure, run_folder::Run};
 

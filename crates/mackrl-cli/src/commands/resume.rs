@@ -5,7 +5,7 @@ use std::{
     path::Path,
 };
 
-use mackrl::training::Trainer;
+use mackrl_run::training::Trainer;
 
 use crate::{
     args::ResumeArgs,

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use mackrl::{config::Config, training::Trainer};
+use mackrl_run::{config::Config, training::Trainer};
 
 use crate::{
     args::TrainArgs,

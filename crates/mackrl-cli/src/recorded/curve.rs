@@ -8,7 +8,8 @@ use std::{
 
 use anyhow::Context;
 use clap::ValueEnum;
-use mackrl::{config::nearest, statistics::mean};
+use mackrl::statistics::mean;
+use mackrl_run::config::nearest;
 use serde_json::Value;
 
 use super::RecordedRun;

@@ -120,7 +120,7 @@ mod tests {
     #[test]
     fn kept_runs_are_found_once_and_their_folders_passed_over() {
         let folder = tempfile::tempdir().unwrap();
-        let config = mackrl::config::Config::default().to_toml();
+        let config = mackrl_run::config::Config::default().to_toml();
         for name in [
             "training/3m-mackrl-seed1",
             "training/3m-mackrl-seed2",

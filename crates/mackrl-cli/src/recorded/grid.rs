@@ -60,7 +60,7 @@ impl Gridded {
 impl Series {
     /// Environment steps between two numbers of a metric.
     pub(crate) fn interval(&self, metric: &str) -> f64 {
-        let interval = |config: &mackrl::config::Config| match metric.starts_with("test_") {
+        let interval = |config: &mackrl_run::config::Config| match metric.starts_with("test_") {
             true => config.test.interval_steps_env,
             false => config.run.metrics_interval_steps_env,
         };

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use mackrl::config::{Config, ConfigBuilder, ConfigError};
+use mackrl_run::config::{Config, ConfigBuilder, ConfigError};
 use serde::{Deserialize, Serialize};
 
 use super::{Measurements, RecordedRun};

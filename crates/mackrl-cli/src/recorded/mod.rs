@@ -14,7 +14,7 @@ mod series;
 use std::path::PathBuf;
 
 use anyhow::Context;
-use mackrl::config::Config;
+use mackrl_run::config::Config;
 
 use crate::{
     provenance::Provenance,

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use mackrl::config::{Config, ConfigBuilder};
+use mackrl_run::config::{Config, ConfigBuilder};
 
 use super::{RecordedRun, setting};
 use crate::{failure::Failure, provenance::Provenance, run_folder::Status};

@@ -8,8 +8,8 @@ mod summary;
 
 use std::path::Path;
 
-use mackrl::replay::{Names, Playback, Replay, ReplayError};
 use mackrl_env::AgentId;
+use mackrl_run::replay::{Names, Playback, Replay, ReplayError};
 
 use crate::{bounded, failure::Failure};
 pub(crate) use explanation::Explanation;

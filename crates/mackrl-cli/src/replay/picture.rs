@@ -1,12 +1,11 @@
 //! From a replay to the picture of one of its moments.
 
-use mackrl::{policy::Choice, replay::Moment};
-use mackrl_env::{
-    AgentId, EntityId, EntitySet, Environment,
-    skirmish::{
-        rules::{BattleState, Order, Team},
-        terrain::MAP_SIZE,
-    },
+use mackrl::policy::Choice;
+use mackrl_env::{AgentId, EntityId, EntitySet, Environment};
+use mackrl_run::replay::Moment;
+use mackrl_skirmish::{
+    rules::{BattleState, Order, Team},
+    terrain::MAP_SIZE,
 };
 
 use super::Opened;
@@ -115,7 +114,7 @@ fn links(opened: &Opened, step: usize) -> Vec<Link> {
 
 fn lens(moment: &Moment, group: &[AgentId]) -> Lens {
     let visible_n = &moment.visible_n;
-    let knowledge = mackrl::replay::GroupKnowledge::of(group, visible_n);
+    let knowledge = mackrl_run::replay::GroupKnowledge::of(group, visible_n);
     let members: Vec<usize> = group.iter().map(|agent| agent.index()).collect();
     let living = |agent: &usize| !visible_n[*agent].is_empty();
     let others: Vec<usize> = (0..visible_n.len())

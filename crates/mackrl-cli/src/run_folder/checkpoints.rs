@@ -17,7 +17,7 @@ use std::{
 };
 
 use anyhow::Context;
-use mackrl::training::Checkpoint;
+use mackrl_run::training::Checkpoint;
 
 use super::{
     CHECKPOINTS, CONFIG, METRICS,

@@ -18,8 +18,8 @@ use std::{
 };
 
 use anyhow::Context;
-use mackrl::{
-    NotFinite,
+use mackrl::NotFinite;
+use mackrl_run::{
     config::{Config, ConfigBuilder},
     training::Checkpoint,
 };

@@ -8,7 +8,7 @@ use std::{
     rc::Rc,
 };
 
-use mackrl::training::Trainer;
+use mackrl_run::training::Trainer;
 
 use super::*;
 
@@ -89,7 +89,7 @@ impl Disk for FaultyDisk {
 fn config() -> Config {
     let mut config = Config::default();
     config.policy.hidden = 3;
-    config.policy.algorithm = mackrl::config::Algorithm::CentralV;
+    config.policy.algorithm = mackrl_run::config::Algorithm::CentralV;
     config.learner.environments = 2;
     config.test.episodes = 1;
     config.run.checkpoints_kept = 1;

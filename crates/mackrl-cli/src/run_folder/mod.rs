@@ -32,7 +32,9 @@ use std::{
 };
 
 use anyhow::Context;
-use mackrl::{
+use checkpoints::Surroundings;
+use disk::{Disk, RealDisk, cannot, cannot_write};
+use mackrl_run::{
     config::Config,
     training::{Checkpoint, assembly::tensors_bytes_max},
 };
@@ -43,8 +45,6 @@ use crate::{
     failure::Failure,
     provenance::{CODE, Provenance},
 };
-use checkpoints::Surroundings;
-use disk::{Disk, RealDisk, cannot, cannot_write};
 pub(crate) use dumps::{Dump, Refusal};
 use event_file::EventFile;
 pub(crate) use latest::{LatestRow, latest_row};

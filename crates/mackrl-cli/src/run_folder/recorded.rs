@@ -3,7 +3,7 @@
 use std::{fs, io, path::Path};
 
 use anyhow::Context;
-use mackrl::config::Config;
+use mackrl_run::config::Config;
 use serde_json::{Map, Value};
 
 use super::{METRICS, WEIGHTS, disk::cannot, read_record, run::read_config};

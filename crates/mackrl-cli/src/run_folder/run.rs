@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use mackrl::{
+use mackrl_run::{
     config::{Config, ConfigBuilder},
     training::assembly::tensors_bytes_max,
 };

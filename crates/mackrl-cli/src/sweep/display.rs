@@ -175,7 +175,7 @@ fn steps(entry: &Entry) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use mackrl::config::Config;
+    use mackrl_run::config::Config;
 
     use super::*;
 

@@ -10,7 +10,7 @@ mod plan;
 
 use std::path::PathBuf;
 
-use mackrl::config::Config;
+use mackrl_run::config::Config;
 use serde::Serialize;
 
 use crate::{

@@ -4,17 +4,13 @@ use std::io::{Read, Write};
 
 use fastrand::Rng;
 use flate2::{Compression, read::GzDecoder, write::GzEncoder};
-use mackrl::{
+use mackrl_env::{EpisodeKey, Stream, random_play::RandomPlay};
+use mackrl_run::{
     config::{Config, ConfigBuilder, presets},
     replay::{Replay, record_script},
     training::{Checkpoint, Trainer, assembly, read_weights},
 };
-use mackrl_env::{
-    EpisodeKey, Stream,
-    random_play::RandomPlay,
-    registry,
-    skirmish::{SkirmishSettings, scripted::ScriptedPolicy},
-};
+use mackrl_skirmish::{SkirmishSettings, scripted::ScriptedPolicy};
 
 use crate::{Target, mutation};
 
@@ -96,7 +92,7 @@ impl Target for Scenario {
 
     fn read(&mut self, input: &[u8]) -> Result<(), String> {
         let text = String::from_utf8_lossy(input);
-        match registry::make_custom("stranger.toml", &text, &SkirmishSettings::default()) {
+        match mackrl_skirmish::make_custom("stranger.toml", &text, &SkirmishSettings::default()) {
             Ok(world) => {
                 let mut play = RandomPlay::new(Box::new(world), 1);
                 (0..3).try_for_each(|_| play.step().map(drop).map_err(|error| error.to_string()))

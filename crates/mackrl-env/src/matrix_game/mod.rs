@@ -19,5 +19,8 @@ pub use information::{
 pub use payoffs::{ACTIONS, Matrix, Payoffs, payoff, payoff_text};
 pub use world::{MatrixGame, MatrixGameSettings};
 
+/// The name by which configurations and commands call the game.
+pub const MATRIX_GAME: &str = "matrix-game";
+
 /// N: agents of the game.
 pub const AGENTS: usize = 2;

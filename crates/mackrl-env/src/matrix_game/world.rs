@@ -63,7 +63,7 @@ impl MatrixGame {
         Ok(Self {
             settings,
             spec: EnvironmentSpec {
-                name: "matrix-game".into(),
+                name: super::MATRIX_GAME.into(),
                 agents: AGENTS,
                 entities: ENTITIES,
                 entity_features: FEATURES,

@@ -5,7 +5,9 @@ use std::{fmt, sync::Arc, thread, time::Duration};
 use mackrl_env::{
     Action, Draw, EntitySet, Environment, EnvironmentSpec, EpisodeKey, EpisodeStatistics,
     Interruption, ObservationMut, PriorKnowledge, StepError, TimeStep,
-    skirmish::{Encounter, Face, Scenario, SkirmishError, SkirmishSettings, rules::BattleState},
+};
+use mackrl_skirmish::{
+    Encounter, Face, Scenario, SkirmishError, SkirmishSettings, rules::BattleState,
 };
 
 use super::{fault::GameFault, game::Game, pool::GamePool, roster::Roster};

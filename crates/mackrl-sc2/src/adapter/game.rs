@@ -1,6 +1,7 @@
 //! One game in its process: ordered about, stepped, begun anew.
 
-use mackrl_env::{EpisodeKey, skirmish::rules::Order};
+use mackrl_env::EpisodeKey;
+use mackrl_skirmish::rules::Order;
 
 use super::{client::Client, fault::GameFault, process::GameProcess, roster::Roster};
 use crate::{

@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use mackrl_env::skirmish::Scenario;
+use mackrl_skirmish::Scenario;
 
 use super::{
     Game, client::Client, fault::GameFault, game::unexpected, pool::GameSettings,

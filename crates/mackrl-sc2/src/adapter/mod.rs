@@ -2,7 +2,7 @@
 //!
 //! [`StarCraft2`] plays episodes as SMAC does: one process a game, kept over many episodes; a new episode begins by killing
 //! everybody, whereupon the map's script brings both armies back. What agents see and are paid is computed by the same
-//! [`mackrl_env::skirmish::Face`] as in the built-in simulator, from the units that the game reports.
+//! [`mackrl_skirmish::Face`] as in the built-in simulator, from the units that the game reports.
 //!
 //! **Faults never become data.** Every request has a deadline, and every answer is checked: its number, its status, who is on
 //! the field and whether they can be as they are said to be. Whatever fails (a crash, a hang, nonsense, a refusal) makes the episode

@@ -1,6 +1,6 @@
 //! Who is who: from the units that a game reports to the state that agents are shown.
 
-use mackrl_env::skirmish::{
+use mackrl_skirmish::{
     Scenario,
     rules::{BattleState, Profile},
     terrain::MAP_SIZE,

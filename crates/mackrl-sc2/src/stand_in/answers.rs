@@ -1,6 +1,6 @@
 //! What the arena looks like in messages.
 
-use mackrl_env::skirmish::{
+use mackrl_skirmish::{
     rules::{Profile, Unit as BattleUnit},
     terrain::MAP_SIZE,
     unit_types::Layer,
@@ -92,8 +92,8 @@ pub(super) fn data(arena: &Arena) -> ResponseData {
 }
 
 /// The game's number of a people.
-pub(crate) const fn race(race: mackrl_env::skirmish::scenario::Race) -> crate::protocol::Race {
-    use mackrl_env::skirmish::scenario::Race;
+pub(crate) const fn race(race: mackrl_skirmish::scenario::Race) -> crate::protocol::Race {
+    use mackrl_skirmish::scenario::Race;
     match race {
         Race::Terran => crate::protocol::Race::Terran,
         Race::Zerg => crate::protocol::Race::Zerg,

@@ -2,12 +2,10 @@
 
 use std::sync::Arc;
 
-use mackrl_env::{
-    Action, EpisodeKey, Stream,
-    skirmish::{
-        Encounter, Face, Scenario, SkirmishSettings,
-        rules::{BattleState, Chance, Order, Team, UnitIndex},
-    },
+use mackrl_env::{Action, EpisodeKey, Stream};
+use mackrl_skirmish::{
+    Encounter, Face, Scenario, SkirmishSettings,
+    rules::{BattleState, Chance, Order, Team, UnitIndex},
 };
 
 /// Loops of an environment step: dice are named by steps, as in the built-in simulator.

@@ -2,14 +2,12 @@
 
 use std::{fmt, sync::Arc};
 
-use mackrl_env::{
-    EpisodeKey,
-    skirmish::{
-        Scenario, UnitData,
-        rules::{Order, UnitIndex},
-        scenario::map_names,
-        unit_types::UnitTypes,
-    },
+use mackrl_env::EpisodeKey;
+use mackrl_skirmish::{
+    Scenario, UnitData,
+    rules::{Order, UnitIndex},
+    scenario::map_names,
+    unit_types::UnitTypes,
 };
 
 use super::{

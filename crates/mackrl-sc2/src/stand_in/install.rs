@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use mackrl_env::skirmish::scenario::map_names;
+use mackrl_skirmish::scenario::map_names;
 
 use super::answers::{BASE_BUILD, GAME_VERSION};
 use crate::units;

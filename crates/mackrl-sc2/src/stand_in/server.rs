@@ -7,7 +7,7 @@ use std::{
     time::Duration,
 };
 
-use mackrl_env::skirmish::UnitData;
+use mackrl_skirmish::UnitData;
 use prost::Message;
 use rustix::process::{Signal, getpid, kill_process};
 

@@ -1,9 +1,7 @@
 //! What clients of the game rely on, and what hostile ones get.
 
-use mackrl_env::{
-    Environment, EpisodeKey, Observations, Stream, registry,
-    skirmish::{SkirmishSettings, UnitData, scenario::map_names},
-};
+use mackrl_env::{Environment, EpisodeKey, Observations, Stream};
+use mackrl_skirmish::{SkirmishSettings, UnitData, scenario::map_names};
 use prost::Message;
 
 use super::*;
@@ -160,7 +158,7 @@ fn every_map_begins_with_the_armies_of_the_simulator() {
     for map in map_names() {
         let mut client = Client::playing(map, None);
         let found = client.units();
-        let mut skirmish = registry::make_skirmish(map, &SkirmishSettings::default()).unwrap();
+        let mut skirmish = mackrl_skirmish::make(map, &SkirmishSettings::default()).unwrap();
         let mut observations = Observations::new(skirmish.spec(), 1);
         let key = EpisodeKey::new(1, Stream::Other, 0);
         skirmish.reset(key, &mut observations.row_mut(0));
@@ -254,7 +252,7 @@ fn orders_reach_units_of_the_own_side_only() {
 #[test]
 fn a_named_episode_is_the_simulators_to_the_bit() {
     let key = EpisodeKey::new(7, Stream::Training, 11);
-    let mut skirmish = registry::make_skirmish("2m_vs_1z", &SkirmishSettings::default()).unwrap();
+    let mut skirmish = mackrl_skirmish::make("2m_vs_1z", &SkirmishSettings::default()).unwrap();
     let mut observations = Observations::new(skirmish.spec(), 1);
     skirmish.reset(key, &mut observations.row_mut(0));
     let mut client = Client::playing("2m_vs_1z", None);

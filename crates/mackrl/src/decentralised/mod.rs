@@ -98,6 +98,3 @@ impl std::fmt::Debug for InProcessAgent<'_> {
             .finish_non_exhaustive()
     }
 }
-
-#[cfg(test)]
-mod tests;

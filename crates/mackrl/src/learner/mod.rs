@@ -339,6 +339,3 @@ fn check_advantages(advantage_bt: &[Vec<f32>]) -> Result<(), NotFinite> {
     }
     Ok(())
 }
-
-#[cfg(test)]
-mod tests;

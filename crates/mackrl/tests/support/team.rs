@@ -1,13 +1,15 @@
 //! Whole teams with small networks in real worlds.
 
 use mackrl::{
-    config::{Config, ConfigBuilder},
     decentralised::Decentralised,
     policy::{Behaviour, Recording},
     rollout::{Episode, Rollout, RolloutSettings},
-    training::assembly::{self, World},
 };
 use mackrl_env::{EpisodeKey, Stream};
+use mackrl_run::{
+    config::{Config, ConfigBuilder},
+    training::assembly::{self, World},
+};
 
 /// The configuration with these settings over the built-in ones.
 pub(crate) fn config(settings: &[&str]) -> Config {

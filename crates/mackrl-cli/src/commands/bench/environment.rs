@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use mackrl::config::ConfigBuilder;
 use mackrl_env::{StepError, random_play::RandomPlay};
+use mackrl_run::config::ConfigBuilder;
 use serde::Serialize;
 
 use super::print_rows;

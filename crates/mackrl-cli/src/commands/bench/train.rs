@@ -2,7 +2,8 @@
 
 use std::{collections::BTreeMap, time::Instant};
 
-use mackrl::{Phase, training::Trainer};
+use mackrl::Phase;
+use mackrl_run::training::Trainer;
 use serde::Serialize;
 
 use super::print_rows;

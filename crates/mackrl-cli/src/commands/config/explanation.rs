@@ -1,6 +1,6 @@
 //! What is to be known about one setting.
 
-use mackrl::config::{Config, ConfigBuilder, ConfigError, Origin, Setting, presets};
+use mackrl_run::config::{Config, ConfigBuilder, ConfigError, Origin, Setting, presets};
 use serde::Serialize;
 
 /// A setting with its meaning, and its value wherever it has one.

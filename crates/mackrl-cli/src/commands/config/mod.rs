@@ -2,11 +2,11 @@
 
 mod explanation;
 
-use mackrl::config::{Config, ConfigBuilder, Origin, schema};
+use explanation::Explanation;
+use mackrl_run::config::{Config, ConfigBuilder, Origin, schema};
 use serde::Serialize;
 
 use crate::{args::ConfigArgs, output};
-use explanation::Explanation;
 
 pub(crate) fn run(args: &ConfigArgs) -> anyhow::Result<()> {
     if args.schema {

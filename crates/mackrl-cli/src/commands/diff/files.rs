@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::Context;
-use mackrl::training::{Difference, compare_tensors};
+use mackrl_run::training::{Difference, compare_tensors};
 use serde::Serialize;
 use serde_json::Value;
 

@@ -4,7 +4,7 @@
 //! rows of metrics that come up on the way are compared with the recorded ones, so that records which do not belong to their
 //! configuration do not pass for a difference of the runs.
 
-use mackrl::training::{Difference, Trainer};
+use mackrl_run::training::{Difference, Trainer};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -154,7 +154,7 @@ impl RowDifference {
 }
 
 /// A row as it would be read from the metrics of a run.
-fn as_recorded(row: &mackrl::training::MetricRow) -> Row {
+fn as_recorded(row: &mackrl_run::training::MetricRow) -> Row {
     match serde_json::to_value(row) {
         Ok(Value::Object(row)) => timeless(row),
         _ => Row::new(),

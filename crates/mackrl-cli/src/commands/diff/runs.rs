@@ -1,6 +1,6 @@
 //! Two runs: what they were to do, what they recorded, and, played again, where they part.
 
-use mackrl::config::Config;
+use mackrl_run::config::Config;
 use serde::Serialize;
 use serde_json::Value;
 

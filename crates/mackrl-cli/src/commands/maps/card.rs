@@ -2,14 +2,12 @@
 
 use std::fmt;
 
-use mackrl_env::{
-    EnvironmentSpec,
-    skirmish::{
-        Skirmish,
-        rules::Team,
-        scenario::{EnemyOrder, Group, Race, Recruit},
-        terrain::{MAP_SIZE, Terrain},
-    },
+use mackrl_env::EnvironmentSpec;
+use mackrl_skirmish::{
+    Skirmish,
+    rules::Team,
+    scenario::{EnemyOrder, Group, Race, Recruit},
+    terrain::{MAP_SIZE, Terrain},
 };
 use serde::Serialize;
 

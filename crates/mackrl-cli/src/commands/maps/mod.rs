@@ -6,18 +6,15 @@ mod row;
 use std::path::Path;
 
 use anyhow::Context;
-use mackrl::config::{ConfigBuilder, ConfigError};
-use mackrl_env::{
-    registry,
-    skirmish::{Skirmish, SkirmishSettings},
-};
+use card::Card;
+use mackrl_run::config::{ConfigBuilder, ConfigError};
+use mackrl_skirmish::{Skirmish, SkirmishSettings};
+use row::Row;
 
 use crate::{
     args::{MapsArgs, read_scenario, world},
     output,
 };
-use card::Card;
-use row::Row;
 
 /// What the list does not hold: people who want "all maps" want SMAC's.
 const ALSO: &str = "\nBesides these, --map takes matrix-game, the game of the paper's Figure 5, and FILE.toml, a scenario of your own.\n\
@@ -40,10 +37,10 @@ pub(crate) fn run(args: &MapsArgs) -> anyhow::Result<()> {
 
 /// SMAC's maps.
 fn all() -> anyhow::Result<Vec<Row>> {
-    let names = registry::map_names().into_iter();
+    let names = mackrl_skirmish::map_names().into_iter();
     names
         .map(|name| {
-            let skirmish = registry::make_skirmish(name, &SkirmishSettings::default());
+            let skirmish = mackrl_skirmish::make(name, &SkirmishSettings::default());
             Ok(Row::of(&skirmish.context("cannot list the maps")?))
         })
         .collect()
@@ -72,7 +69,7 @@ fn show(name: &str, json: bool) -> anyhow::Result<()> {
 fn checked(file: &Path) -> anyhow::Result<Skirmish> {
     let text = read_scenario(file)?;
     let name = file.display().to_string();
-    let skirmish = registry::make_custom(&name, &text, &SkirmishSettings::default());
+    let skirmish = mackrl_skirmish::make_custom(&name, &text, &SkirmishSettings::default());
     let skirmish = skirmish.map_err(|error| ConfigError::Scenario {
         message: error.to_string(),
     })?;

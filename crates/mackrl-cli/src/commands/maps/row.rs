@@ -1,9 +1,7 @@
 //! A map as a line of a list.
 
-use mackrl_env::{
-    Environment,
-    skirmish::{Skirmish, rules::Team, scenario::Race},
-};
+use mackrl_env::Environment;
+use mackrl_skirmish::{Skirmish, rules::Team, scenario::Race};
 use serde::Serialize;
 
 use crate::output;

@@ -3,11 +3,13 @@
 mod report;
 mod statistics;
 
-use mackrl::{
+use mackrl_env::{EpisodeKey, Stream};
+use mackrl_run::{
     config::{ConfigBuilder, Engine, EnvironmentConfig},
     replay::{Replay, record_script},
 };
-use mackrl_env::{EpisodeKey, Stream, registry};
+use report::Report;
+use statistics::{Row, play_many};
 
 use crate::{
     args::{PlayArgs, world},
@@ -17,8 +19,6 @@ use crate::{
     replay::{Opened, Summary, picture},
     reproduce::Meter,
 };
-use report::Report;
-use statistics::{Row, play_many};
 
 /// The word that stands for every map.
 const ALL: &str = "all";
@@ -71,7 +71,7 @@ fn one(args: &PlayArgs, replay: Replay) -> anyhow::Result<()> {
 /// The worlds that were asked for.
 fn maps(args: &PlayArgs) -> anyhow::Result<Vec<EnvironmentConfig>> {
     let names = match args.map.as_str() {
-        ALL => registry::map_names(),
+        ALL => mackrl_skirmish::map_names(),
         name => vec![name],
     };
     let map = |name: &str| {
@@ -86,7 +86,7 @@ fn maps(args: &PlayArgs) -> anyhow::Result<Vec<EnvironmentConfig>> {
 fn many(
     args: &PlayArgs,
     maps: &[EnvironmentConfig],
-    policies: &[mackrl_env::skirmish::scripted::ScriptedPolicy],
+    policies: &[mackrl_skirmish::scripted::ScriptedPolicy],
 ) -> anyhow::Result<()> {
     if let Some(folder) = &args.out {
         report::make_folder(folder)?;

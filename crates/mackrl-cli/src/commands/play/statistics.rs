@@ -5,11 +5,9 @@ use std::sync::{
     atomic::{AtomicUsize, Ordering},
 };
 
-use mackrl::{config::EnvironmentConfig, training::assembly::WorldSource};
-use mackrl_env::{
-    Action, Environment, EpisodeKey, Observations, StepError, Stream,
-    skirmish::scripted::{ScriptedPolicy, ScriptedTeam},
-};
+use mackrl_env::{Action, Environment, EpisodeKey, Observations, StepError, Stream};
+use mackrl_run::{config::EnvironmentConfig, training::assembly::WorldSource};
+use mackrl_skirmish::scripted::{ScriptedPolicy, ScriptedTeam};
 use serde::Serialize;
 
 use crate::{commands::sc2, output};

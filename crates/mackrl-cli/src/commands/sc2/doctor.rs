@@ -2,13 +2,13 @@
 
 use std::net::TcpListener;
 
-use mackrl::config::EnvironmentConfig;
-use mackrl_env::{registry::map_names, skirmish::terrain::MAP_SIZE};
+use mackrl_run::config::EnvironmentConfig;
 use mackrl_sc2::{
     adapter::{Game, Installation},
     protocol::{ImageData, ResponseGameInfo},
     stand_in::install::is_stand_in,
 };
+use mackrl_skirmish::{map_names, terrain::MAP_SIZE};
 use serde::Serialize;
 
 use super::worlds::{scenario, settings};
@@ -151,7 +151,7 @@ fn look(args: &DoctorArgs) -> anyhow::Result<Vec<Check>> {
 /// Cells in which the game's pathing grid differs from the simulator's ground.
 fn differing_cells(
     info: &ResponseGameInfo,
-    terrain: &mackrl_env::skirmish::terrain::Terrain,
+    terrain: &mackrl_skirmish::terrain::Terrain,
 ) -> Option<usize> {
     let ImageData {
         bits_per_pixel: Some(1),

@@ -1,12 +1,10 @@
 //! One scripted episode on StarCraft II, and the game's own replay of it.
 
 use anyhow::Context;
-use mackrl::config::EnvironmentConfig;
-use mackrl_env::{
-    Action, Environment, EpisodeKey, EpisodeStatistics, Observations, StepError,
-    skirmish::scripted::{ScriptedPolicy, ScriptedTeam},
-};
+use mackrl_env::{Action, Environment, EpisodeKey, EpisodeStatistics, Observations, StepError};
+use mackrl_run::config::EnvironmentConfig;
 use mackrl_sc2::adapter::StarCraft2;
+use mackrl_skirmish::scripted::{ScriptedPolicy, ScriptedTeam};
 
 use super::worlds::StarCraftWorlds;
 use crate::{args::PlayArgs, output};

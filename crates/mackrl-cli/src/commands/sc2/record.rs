@@ -7,8 +7,8 @@ use std::{
 };
 
 use anyhow::Context;
-use mackrl::config::{Engine, EnvironmentConfig};
 use mackrl_env::{EpisodeKey, Stream};
+use mackrl_run::config::{Engine, EnvironmentConfig};
 use mackrl_sc2::protocol::Unit;
 use serde_json::{Value, json};
 

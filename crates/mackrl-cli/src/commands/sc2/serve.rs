@@ -6,15 +6,15 @@ use std::{
 };
 
 use anyhow::Context;
-use mackrl::{
+use mackrl_run::{
     config::EnvironmentConfig,
     replay::{Player, Replay, Step},
 };
-use mackrl_env::skirmish::UnitData;
 use mackrl_sc2::{
     lifetime::end_with_parent,
     stand_in::{EpisodeRecord, GameArguments, StandIn, StandInOptions, faults::FaultPlan},
 };
+use mackrl_skirmish::UnitData;
 
 use crate::{
     args::{ServeArgs, UnitsChoice},

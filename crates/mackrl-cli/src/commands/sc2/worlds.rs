@@ -5,16 +5,14 @@ use std::{
     time::Duration,
 };
 
-use mackrl::{
-    Error,
+use mackrl::Error;
+use mackrl_env::Environment;
+use mackrl_run::{
     config::{Config, Engine, EnvironmentConfig},
     training::assembly::{Simulator, World, WorldSource},
 };
-use mackrl_env::{
-    Environment,
-    skirmish::{EnemyBehaviour, Scenario, unit_types::UnitTypes},
-};
 use mackrl_sc2::adapter::{GamePool, GameSettings, Installation, StarCraft2, process::Launcher};
+use mackrl_skirmish::{EnemyBehaviour, Scenario, unit_types::UnitTypes};
 
 /// Games at once where nothing else limits them.
 const PARALLEL_GAMES: usize = 8;
@@ -124,7 +122,7 @@ pub(super) fn scenario(config: &EnvironmentConfig) -> Result<Arc<Scenario>, Erro
         None => Err(wrong(format!(
             "StarCraft II has no map for `{}`, expected one of {}",
             config.map,
-            mackrl_env::registry::map_names().join(", ")
+            mackrl_skirmish::map_names().join(", ")
         ))),
     }
 }

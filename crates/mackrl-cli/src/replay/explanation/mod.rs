@@ -2,11 +2,9 @@
 
 mod text;
 
-use mackrl::{
-    policy::{Choice, PairThought, Thought},
-    replay::GroupKnowledge,
-};
+use mackrl::policy::{Choice, PairThought, Thought};
 use mackrl_env::{Action, AgentId, EntityId, EntitySet};
+use mackrl_run::replay::GroupKnowledge;
 use serde::Serialize;
 
 use super::{Opened, Summary};

@@ -1,10 +1,9 @@
 //! What a page knows of a replay: numbers short enough for a long battle of many units.
 
-use mackrl::{
-    policy::{Choice, Mode, PairThought},
-    replay::Player,
-};
-use mackrl_env::{Action, AgentId, EntityId, Environment, skirmish::terrain::MAP_SIZE};
+use mackrl::policy::{Choice, Mode, PairThought};
+use mackrl_env::{Action, AgentId, EntityId, Environment};
+use mackrl_run::replay::Player;
+use mackrl_skirmish::terrain::MAP_SIZE;
 use serde::Serialize;
 
 use super::super::{Opened, Summary, picture::shot};
@@ -206,7 +205,7 @@ impl Frame {
 }
 
 impl Decision {
-    fn of(step: &mackrl::replay::Step) -> Self {
+    fn of(step: &mackrl_run::replay::Step) -> Self {
         let thought = step.thought.clone().unwrap_or_default();
         let is_known = step.thought.is_some();
         Self {

@@ -11,14 +11,14 @@ mod variants;
 use std::fs;
 
 use anyhow::Context as _;
+use claims::Finals;
 use clap::Args;
-use mackrl::{
-    config::ConfigBuilder,
-    statistics::{
-        Aggregate, Bootstrap, Interval, mean_and_standard_error, probability_of_improvement,
-    },
+use mackrl::statistics::{
+    Aggregate, Bootstrap, Interval, mean_and_standard_error, probability_of_improvement,
 };
+use mackrl_run::config::ConfigBuilder;
 use serde::Serialize;
+use variants::{Variant, variants};
 
 use super::{
     Claim,
@@ -30,8 +30,6 @@ use crate::{
     provenance::Provenance,
     recorded::{TrainingRun, final_mean},
 };
-use claims::Finals;
-use variants::{Variant, variants};
 
 /// Show where MACKRL's gain comes from: one plot of nine learners that differ in one thing each.
 ///

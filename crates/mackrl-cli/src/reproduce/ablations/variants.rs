@@ -1,6 +1,6 @@
 //! What is taken away from MACKRL, or put in its place, one thing at a time.
 
-use mackrl::config::{CommonKnowledgeFeatures, Config};
+use mackrl_run::config::{CommonKnowledgeFeatures, Config};
 
 /// A learner of the ablation study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -92,7 +92,7 @@ pub(super) fn variants(preset: &Config) -> Vec<Variant> {
 
 #[cfg(test)]
 mod tests {
-    use mackrl::config::{ConfigBuilder, presets};
+    use mackrl_run::config::{ConfigBuilder, presets};
 
     use super::*;
 

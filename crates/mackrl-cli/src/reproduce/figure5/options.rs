@@ -3,11 +3,9 @@
 use std::{num::NonZeroUsize, path::PathBuf, thread};
 
 use clap::{Args, ValueEnum, builder::RangedU64ValueParser};
-use mackrl::config::EnvironmentConfig;
-use mackrl_env::{
-    matrix_game::{MatrixGameSettings, ObservationDistribution, Payoffs},
-    registry::MATRIX_GAME,
-};
+use mackrl_env::matrix_game::MATRIX_GAME;
+use mackrl_env::matrix_game::{MatrixGameSettings, ObservationDistribution, Payoffs};
+use mackrl_run::config::EnvironmentConfig;
 
 use crate::provenance::{Choice, Judgement, Provenance};
 

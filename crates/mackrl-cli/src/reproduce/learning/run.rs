@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use anyhow::Context as _;
-use mackrl::config::{Config, ConfigBuilder};
+use mackrl_run::config::{Config, ConfigBuilder};
 use serde::{Deserialize, Serialize};
 
 use super::LearningOptions;

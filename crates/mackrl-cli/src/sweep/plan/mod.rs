@@ -9,7 +9,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use mackrl::config::{
+use mackrl_run::config::{
     Config, ConfigBuilder, ConfigError, Leaf, Origin, line_and_column, parse_document,
 };
 use serde::{Deserialize, de::IgnoredAny};

@@ -1,0 +1,171 @@
+//! Settings that choose one of a few things.
+
+use std::{fmt, str::FromStr};
+
+use mackrl::partition::{PartitionSchedule, partition_count};
+use mackrl_env::settings::Accepts;
+use serde::{Deserialize, Serialize};
+
+/// What learns.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Algorithm {
+    /// Pairwise MACKRL: a pair selector, pair controllers and agent controllers.
+    #[default]
+    Mackrl,
+    /// Central-V: the agent controllers alone, with the same central critic.
+    CentralV,
+}
+
+/// What plays the battles.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Engine {
+    /// The built-in simulator.
+    #[default]
+    Simulator,
+    /// StarCraft II itself, or a server that stands in for it.
+    Sc2,
+}
+
+/// How parameters follow the gradient.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OptimiserKind {
+    /// Adam (Kingma and Ba, 2015), as the paper says.
+    #[default]
+    Adam,
+    /// `RMSprop`, as the authors' code.
+    Rmsprop,
+}
+
+/// Which partitions of the agents into pairs the pair selector chooses from; written `all`, `round-robin` or `sampled:K`.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub enum PartitionChoice {
+    /// Every partition; for teams of at most 8 agents (105 partitions).
+    #[default]
+    All,
+    /// One partition a step, by the circle method on a relabelling drawn from the shared seed.
+    RoundRobin,
+    /// This many partitions (1 to [`Self::SAMPLED_MAX`]), drawn once from the shared seed and kept for the whole run.
+    Sampled(usize),
+}
+
+impl PartitionChoice {
+    /// The largest sample: the selector has an output for each, so more would cost memory and time without use.
+    pub const SAMPLED_MAX: usize = 9999;
+
+    /// What can be written.
+    pub(super) const ACCEPTS: Accepts = Accepts::Text {
+        expects: "`all`, `round-robin` or `sampled:K` with K in [1, 9999]",
+        pattern: Some("^(all|round-robin|sampled:[1-9][0-9]{0,3})$"),
+    };
+
+    /// What could be chosen instead, if a team of so many agents has not the partitions that this asks for.
+    pub(super) fn expected_of(self, agents: usize) -> Option<String> {
+        match self {
+            Self::All if agents > PartitionSchedule::MOST_AGENTS_ENUMERATED => {
+                Some("`round-robin` or `sampled:K`".to_owned())
+            }
+            Self::Sampled(count) if count as u128 > partition_count(agents) => Some(format!(
+                "`all` or `sampled:K` with K <= {}",
+                partition_count(agents)
+            )),
+            _ => None,
+        }
+    }
+}
+
+impl From<PartitionChoice> for PartitionSchedule {
+    fn from(choice: PartitionChoice) -> Self {
+        match choice {
+            PartitionChoice::All => Self::All,
+            PartitionChoice::RoundRobin => Self::RoundRobin,
+            PartitionChoice::Sampled(count) => Self::Sampled { count },
+        }
+    }
+}
+
+impl fmt::Display for PartitionChoice {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::All => formatter.write_str("all"),
+            Self::RoundRobin => formatter.write_str("round-robin"),
+            Self::Sampled(count) => write!(formatter, "sampled:{count}"),
+        }
+    }
+}
+
+impl FromStr for PartitionChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        match text {
+            "all" => Ok(Self::All),
+            "round-robin" => Ok(Self::RoundRobin),
+            _ => text
+                .strip_prefix("sampled:")
+                .and_then(|count| count.parse().ok())
+                .filter(|count| (1..=Self::SAMPLED_MAX).contains(count))
+                .map(Self::Sampled)
+                .ok_or_else(|| format!("`{text}` is not {}", Self::ACCEPTS)),
+        }
+    }
+}
+
+impl TryFrom<String> for PartitionChoice {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, Self::Error> {
+        text.parse()
+    }
+}
+
+impl From<PartitionChoice> for String {
+    fn from(choice: PartitionChoice) -> Self {
+        choice.to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn partition_choices_are_read_as_they_are_written() {
+        for choice in [
+            PartitionChoice::All,
+            PartitionChoice::RoundRobin,
+            PartitionChoice::Sampled(5),
+        ] {
+            assert_eq!(choice.to_string().parse(), Ok(choice));
+        }
+    }
+
+    #[test]
+    fn a_team_is_not_asked_for_partitions_that_it_does_not_have() {
+        assert_eq!(PartitionChoice::All.expected_of(8), None);
+        assert!(PartitionChoice::All.expected_of(9).is_some());
+        assert_eq!(PartitionChoice::RoundRobin.expected_of(27), None);
+        assert_eq!(PartitionChoice::Sampled(3).expected_of(3), None);
+        assert_eq!(
+            PartitionChoice::Sampled(4).expected_of(3).as_deref(),
+            Some("`all` or `sampled:K` with K <= 3")
+        );
+    }
+
+    #[test]
+    fn a_sample_has_at_least_one_partition_and_not_too_many() {
+        for text in [
+            "sampled:0",
+            "sampled:",
+            "sampled:-1",
+            "sampled:10000",
+            "sampled",
+            "some",
+        ] {
+            assert!(text.parse::<PartitionChoice>().is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,10 @@
+//! A run of MACKRL: its configuration, the loop that trains a team, what is kept of it, and replays of what it did.
+//!
+//! The crate [`mackrl`] holds the paper and writes no file. This one brings worlds, policies and learners together
+//! ([`training`]) as a configuration ([`config`]) describes them, and records episodes that can be played again ([`replay`]).
+
+pub mod config;
+pub mod replay;
+pub mod training;
+
+pub use mackrl::{Error, NotFinite};

@@ -1,0 +1,134 @@
+//! A skirmish as an environment.
+
+use std::sync::Arc;
+
+use mackrl_env::{
+    Action, Environment, EnvironmentSpec, EpisodeKey, EpisodeStatistics, ObservationMut,
+    PriorKnowledge, StepError, Stream, TimeStep,
+};
+
+use crate::{
+    Encounter,
+    error::SkirmishError,
+    face::{
+        layout::Layout,
+        view::{BattleTally, Face},
+    },
+    rules::{Battle, Chance, UnitIndex},
+    scenario::Scenario,
+    settings::SkirmishSettings,
+};
+
+/// A StarCraft micromanagement map: agents against the game's own units, with SMAC's interface.
+///
+/// A step gives every living agent one order, plays `step_mul` loops and shows what has come of it.
+#[derive(Debug, Clone)]
+pub struct Skirmish {
+    pub(super) encounter: Encounter,
+    pub(super) face: Face,
+    key: EpisodeKey,
+}
+
+impl Skirmish {
+    /// Sets up `scenario` to be played under `settings`.
+    ///
+    /// # Errors
+    /// [`SkirmishError::Setting`] if a setting is out of range.
+    pub fn new(scenario: Arc<Scenario>, settings: SkirmishSettings) -> Result<Self, SkirmishError> {
+        let encounter = Encounter::new(Arc::clone(&scenario), &settings);
+        Ok(Self {
+            face: Face::new(scenario, settings, encounter.muster())?,
+            encounter,
+            key: EpisodeKey::new(0, Stream::Other, 0),
+        })
+    }
+
+    /// The battle as it stands.
+    #[must_use]
+    pub fn battle(&self) -> &Battle {
+        self.encounter.battle()
+    }
+
+    /// Sizes of what agents and critics are shown.
+    #[must_use]
+    pub fn layout(&self) -> &Layout {
+        self.face.layout()
+    }
+
+    /// The greatest return before scaling: the enemies' life and shields, their deaths, and the victory.
+    #[must_use]
+    pub fn max_reward(&self) -> f32 {
+        self.face.max_reward()
+    }
+
+    /// The map.
+    #[must_use]
+    pub fn scenario(&self) -> &Scenario {
+        self.encounter.scenario()
+    }
+
+    /// Episodes ended and won since the environment was made.
+    #[must_use]
+    pub fn tally(&self) -> BattleTally {
+        self.face.tally()
+    }
+
+    /// How it is played and shown to agents.
+    #[must_use]
+    pub fn settings(&self) -> &SkirmishSettings {
+        self.face.settings()
+    }
+
+    /// A number that differs, but for chance, when two states of the battle differ; the same on every machine.
+    #[must_use]
+    pub fn state_hash(&self) -> u64 {
+        self.battle().state().hash()
+    }
+
+    fn order_agents(&mut self, actions: &[Action]) {
+        for (agent, action) in actions.iter().enumerate() {
+            let order = self
+                .face
+                .order(self.encounter.battle().state(), agent, *action);
+            if let Some(order) = order {
+                let agent = UnitIndex::try_from(agent).expect("a battle has ≤ 256 units");
+                self.encounter.order(agent, order);
+            }
+        }
+    }
+}
+
+impl Environment for Skirmish {
+    fn spec(&self) -> &EnvironmentSpec {
+        self.face.spec()
+    }
+
+    fn prior_knowledge(&self) -> Arc<dyn PriorKnowledge> {
+        self.face.knowledge().clone()
+    }
+
+    fn reset(&mut self, key: EpisodeKey, out: &mut ObservationMut<'_>) {
+        self.key = key;
+        self.encounter.begin(key);
+        self.face.begin(self.encounter.battle().state(), out);
+    }
+
+    fn step(
+        &mut self,
+        actions: &[Action],
+        out: &mut ObservationMut<'_>,
+    ) -> Result<TimeStep, StepError> {
+        self.face.check(self.encounter.battle().state(), actions)?;
+        self.order_agents(actions);
+        let mut chance = Chance::new(self.key, self.face.steps() + 1);
+        for _ in 0..self.face.settings().step_mul {
+            self.encounter.advance(&mut chance);
+        }
+        let state = self.encounter.battle().state();
+        Ok(self.face.settle(state, actions, out))
+    }
+
+    fn statistics(&self) -> EpisodeStatistics {
+        self.face.statistics()
+    }
+}

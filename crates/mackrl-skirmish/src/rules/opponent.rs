@@ -1,0 +1,185 @@
+//! What aggressive units do unasked: scan, acquire, retarget, answer attacks, call for help, give up.
+//!
+//! The game data give the ranges (scan, help, leash); how often the engine looks and how it breaks ties is not known. Here every
+//! unit looks each quarter of a second, and at once when its quarry has died. Without a quarry it takes the nearest target
+//! that it notices; with one in weapon range it stays with it until one is dead; with one out of range it takes the nearest. Fog is lifted on these maps, so sight plays no part.
+
+use crate::rules::{Battle, Order, Stance, UnitIndex};
+
+/// Loops between two looks for a quarry.
+const RESCAN_LOOPS: f32 = 4.0;
+/// Difference of squared distances, in squared map units, below which two targets are equally near.
+const NEARNESS_TOLERANCE: f32 = 1e-3;
+
+impl Battle {
+    /// Lets every living aggressive unit keep, change or find its quarry.
+    pub(super) fn choose_quarries(&mut self) {
+        for index in 0..self.state.units.len() {
+            let unit = &self.state.units[index];
+            let is_free = matches!(
+                unit.order,
+                Order::Stop | Order::AttackMove { .. } | Order::Hunt
+            );
+            if unit.stance == Stance::Aggressive && unit.is_alive() && is_free {
+                self.choose_quarry(index);
+            }
+        }
+    }
+
+    fn choose_quarry(&mut self, index: usize) {
+        self.give_up_lost_quarry(index);
+        let unit = &mut self.state.units[index];
+        unit.rescan = (unit.rescan - 1.0).max(0.0);
+        if unit.swing.is_some() {
+            return;
+        }
+        if unit.rescan > 0.0 {
+            return;
+        }
+        unit.rescan = RESCAN_LOOPS;
+        if let Some(quarry) = unit.quarry
+            && self.is_in_reach(index, usize::from(quarry))
+        {
+            return;
+        }
+        let found = self.nearest_target(index, false);
+        let hunts = self.state.units[index].order == Order::Hunt;
+        let found = found.or_else(|| hunts.then(|| self.nearest_target(index, true)).flatten());
+        if let Some(target) = found {
+            self.engage(index, target);
+        }
+    }
+
+    fn give_up_lost_quarry(&mut self, index: usize) {
+        let unit = &self.state.units[index];
+        let Some(quarry) = unit.quarry else { return };
+        let [from_x, from_y] = unit.chase_from;
+        let (dx, dy) = (self.state.x[index] - from_x, self.state.y[index] - from_y);
+        let is_leashed = unit.order != Order::Hunt && dx * dx + dy * dy > self.field.leash_squared;
+        if is_leashed || !self.state.units[usize::from(quarry)].is_alive() {
+            let unit = &mut self.state.units[index];
+            unit.quarry = None;
+            unit.swing = None;
+            unit.rescan = 0.0;
+        }
+    }
+
+    /// Whether `target` is within the weapon range of `index`.
+    fn is_in_reach(&self, index: usize, target: usize) -> bool {
+        let own = &self.field.profiles[usize::from(self.state.units[index].kind)];
+        let other = &self.field.profiles[usize::from(self.state.units[target].kind)];
+        own.strike.as_ref().is_some_and(|strike| {
+            self.state.distance_squared(index, target) <= strike.reach_squared(own, other)
+        })
+    }
+
+    /// The nearest unit of the other side that `index` can attack, within its scan range or anywhere. All types have the same
+    /// priority.
+    fn nearest_target(&self, index: usize, anywhere: bool) -> Option<UnitIndex> {
+        let unit = &self.state.units[index];
+        let own = &self.field.profiles[usize::from(unit.kind)];
+        let strike = own.strike.as_ref()?;
+        let (x, y) = (self.state.x[index], self.state.y[index]);
+        let mut nearest = Nearest::default();
+        for (other, candidate) in self.state.units.iter().enumerate() {
+            if candidate.team == unit.team || !candidate.is_alive() {
+                continue;
+            }
+            let (dx, dy) = (self.state.x[other] - x, self.state.y[other] - y);
+            let square = dx * dx + dy * dy;
+            let kind = usize::from(candidate.kind);
+            let scan = own.scan_range + own.radius + self.field.profiles[kind].radius;
+            if (anywhere || square <= scan * scan) && strike.effects[kind].can_hit {
+                nearest.consider(other, square, self.state.y[other]);
+            }
+        }
+        nearest.unit()
+    }
+
+    fn engage(&mut self, index: usize, target: UnitIndex) {
+        let position = [self.state.x[index], self.state.y[index]];
+        let unit = &mut self.state.units[index];
+        if unit.quarry.is_none() {
+            unit.chase_from = position;
+        }
+        unit.quarry = Some(target);
+        unit.rescan = RESCAN_LOOPS;
+    }
+
+    /// Lets those who fight nobody answer the hits of this loop: their own, and those of friends who call for help. Each turns
+    /// on the nearest of these attackers. The dead call too: their friends saw the shot.
+    pub(super) fn respond(&mut self) {
+        if self.scratch.hits.is_empty() {
+            return;
+        }
+        for index in 0..self.state.units.len() {
+            let unit = &self.state.units[index];
+            let is_free = matches!(
+                unit.order,
+                Order::Stop | Order::AttackMove { .. } | Order::Hunt
+            );
+            let answers = unit.stance == Stance::Aggressive
+                && unit.is_alive()
+                && unit.quarry.is_none()
+                && is_free;
+            if answers && let Some(attacker) = self.nearest_attacker(index) {
+                self.engage(index, attacker);
+            }
+        }
+        for hit in &self.scratch.hits {
+            let victim = &mut self.state.units[usize::from(hit.target)];
+            if victim.call_wait <= 0.0 {
+                victim.call_wait = self.field.help_period_loops;
+            }
+        }
+    }
+
+    /// The nearest of those who in this loop hit `index` or a friend whose call it hears.
+    fn nearest_attacker(&self, index: usize) -> Option<UnitIndex> {
+        let mut nearest = Nearest::default();
+        for hit in &self.scratch.hits {
+            let (victim, attacker) = (usize::from(hit.target), usize::from(hit.attacker));
+            let friend = &self.state.units[victim];
+            let hears = friend.team == self.state.units[index].team
+                && friend.call_wait <= 0.0
+                && self.state.distance_squared(index, victim) <= self.field.help_radius_squared;
+            if (victim == index || hears) && self.can_attack(index, attacker) {
+                let square = self.state.distance_squared(index, attacker);
+                nearest.consider(attacker, square, self.state.y[attacker]);
+            }
+        }
+        nearest.unit()
+    }
+}
+
+/// Keeps the nearest of some units. Of two that are equally near, but for a tolerance, it is the one of smaller y: a rule by
+/// index would have one army focus its fire by accident and its mirror image not.
+struct Nearest {
+    found: Option<usize>,
+    square: f32,
+    y: f32,
+}
+
+impl Default for Nearest {
+    fn default() -> Self {
+        Self {
+            found: None,
+            square: f32::INFINITY,
+            y: f32::INFINITY,
+        }
+    }
+}
+
+impl Nearest {
+    fn consider(&mut self, unit: usize, square: f32, y: f32) {
+        let is_nearer = square < self.square - NEARNESS_TOLERANCE
+            || square < self.square + NEARNESS_TOLERANCE && y < self.y;
+        if is_nearer {
+            (self.found, self.square, self.y) = (Some(unit), square, y);
+        }
+    }
+
+    fn unit(&self) -> Option<UnitIndex> {
+        self.found.and_then(|unit| UnitIndex::try_from(unit).ok())
+    }
+}
