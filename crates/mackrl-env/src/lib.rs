@@ -21,6 +21,7 @@ mod observations;
 pub mod random;
 pub mod random_play;
 pub mod settings;
+mod world;
 
 pub use entity_set::EntitySet;
 pub use environment::{
@@ -30,3 +31,4 @@ pub use environment::{
 pub use ids::{Action, AgentId, EntityId};
 pub use observations::{KnownEntities, LocalView, ObservationMut, Observations};
 pub use random::{Draw, EpisodeKey, Stream};
+pub use world::{Counter, Prototype, World, WorldError, WorldKind};

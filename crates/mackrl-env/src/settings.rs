@@ -8,7 +8,8 @@ use std::{
     ops::Bound::{self, Excluded, Included, Unbounded},
 };
 
-use serde::Serialize;
+use serde::{Serialize, de::DeserializeOwned};
+use thiserror::Error;
 
 /// 2⁵³: up to here every reader of TOML and JSON keeps integers exactly, those that hold them as f64 included.
 pub const EXACT: u64 = 1 << 53;
@@ -154,7 +155,7 @@ fn alternatives(words: &[&str]) -> String {
     }
 }
 
-/// What is known about a setting besides its value.
+/// What is known about a setting besides its value. Declarations live as long as the program.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setting {
     /// Its name within its section.
@@ -175,11 +176,16 @@ impl Setting {
             // An integer that TOML cannot hold.
             Err(_) => format!("{value:?}"),
         };
-        Some(Violation {
+        Some(self.refuse(found))
+    }
+
+    /// What is wrong with `found`, which it does not take.
+    const fn refuse(&self, found: String) -> Violation {
+        Violation {
             name: self.name,
             found,
             accepts: self.accepts,
-        })
+        }
     }
 }
 
@@ -194,6 +200,100 @@ pub struct Violation {
     pub accepts: Accepts,
 }
 
+/// A section of settings that [`declare_settings!`](crate::declare_settings) has declared.
+pub trait Settings: Default + Serialize + DeserializeOwned {
+    /// Every setting with its meaning and the values that it takes, in the order of declaration.
+    const DECLARED: &'static [Setting];
+
+    /// The first setting with a value that it does not take.
+    fn first_violation(&self) -> Option<Violation>;
+
+    /// The built-in values by their names.
+    #[must_use]
+    fn defaults() -> toml::Table {
+        toml::Table::try_from(Self::default()).expect("settings are values that TOML has")
+    }
+
+    /// Reads a table; what it does not set has its built-in value. Integers are taken for numbers, as people write them.
+    ///
+    /// # Errors
+    /// [`SettingsError`] if a name is unknown, or a value is none that its setting takes.
+    fn read(table: &toml::Table) -> Result<Self, SettingsError> {
+        let mut values = Self::defaults();
+        for (name, value) in table {
+            let Some(setting) = Self::DECLARED.iter().find(|setting| setting.name == name) else {
+                return Err(SettingsError::Unknown(name.clone()));
+            };
+            let value = as_number_if_asked(setting, value);
+            let one = toml::Table::from_iter([(name.clone(), value.clone())]);
+            if !setting.accepts.admits(&value) || Self::deserialize(one).is_err() {
+                return Err(setting.refuse(value.to_string()).into());
+            }
+            values.insert(name.clone(), value);
+        }
+        let settings = Self::deserialize(values).expect("each value was read alone");
+        match settings.first_violation() {
+            Some(violation) => Err(violation.into()),
+            None => Ok(settings),
+        }
+    }
+}
+
+/// `value`, but for an integer as a number if `setting` takes numbers.
+fn as_number_if_asked(setting: &Setting, value: &toml::Value) -> toml::Value {
+    match (setting.accepts, value) {
+        (Accepts::Number { .. }, toml::Value::Integer(integer)) => {
+            toml::Value::Float(*integer as f64)
+        }
+        _ => value.clone(),
+    }
+}
+
+/// Why a table of settings was not read.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum SettingsError {
+    /// No setting has this name.
+    #[error("no setting is called `{0}`")]
+    Unknown(String),
+    /// A setting has a value that it does not take.
+    #[error(transparent)]
+    Wrong(#[from] WrongSetting),
+    /// Two values do not go together, each of which would be taken beside another. Which of them is to blame is for those to
+    /// say who can tell which was written later.
+    #[error("{}", .0[0])]
+    AtOdds(Box<[WrongSetting; 2]>),
+}
+
+/// A setting with a value that it does not take.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("setting `{name}` is {found}, expected {expected}{}", suggestion(nearest.as_deref()))]
+pub struct WrongSetting {
+    /// Name of the setting.
+    pub name: String,
+    /// The value.
+    pub found: String,
+    /// Which values are taken, in words.
+    pub expected: String,
+    /// The value that was probably meant, if one is similar to what was found.
+    pub nearest: Option<String>,
+}
+
+fn suggestion(nearest: Option<&str>) -> String {
+    nearest.map_or_else(String::new, |name| format!(", did you mean `{name}`?"))
+}
+
+impl From<Violation> for SettingsError {
+    fn from(violation: Violation) -> Self {
+        Self::Wrong(WrongSetting {
+            name: violation.name.to_owned(),
+            found: violation.found,
+            expected: violation.accepts.to_string(),
+            nearest: None,
+        })
+    }
+}
+
 /// Declares a section of settings: the struct, its built-in values, what it accepts and what that means.
 ///
 /// A field reads `name: type = built-in value, accepted values;`. The result is a plain struct with public fields that is
@@ -202,18 +302,18 @@ pub struct Violation {
 macro_rules! declare_settings {
     (
         $(#[$attribute:meta])*
-        pub struct $section:ident {
+        $visibility:vis struct $section:ident {
             $( $(#[doc = $meaning:literal])+ $field:ident: $type:ty = $value:expr, $accepts:expr; )+
         }
     ) => {
         $(#[$attribute])*
         #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
         #[serde(default, deny_unknown_fields)]
-        pub struct $section {
+        $visibility struct $section {
             $(
                 $(#[doc = $meaning])+
                 #[doc = concat!("\n\nAccepts `", stringify!($accepts), "`; `", stringify!($value), "` unless set.")]
-                pub $field: $type,
+                $visibility $field: $type,
             )+
         }
 
@@ -223,9 +323,17 @@ macro_rules! declare_settings {
             }
         }
 
+        impl $crate::settings::Settings for $section {
+            const DECLARED: &'static [$crate::settings::Setting] = Self::SETTINGS;
+
+            fn first_violation(&self) -> Option<$crate::settings::Violation> {
+                self.violation()
+            }
+        }
+
         impl $section {
             /// Every setting of this section with its meaning and the values that it takes, in the order of declaration.
-            pub const SETTINGS: &'static [$crate::settings::Setting] = &[$(
+            $visibility const SETTINGS: &'static [$crate::settings::Setting] = &[$(
                 $crate::settings::Setting {
                     name: stringify!($field),
                     meaning: concat!($($meaning),+).trim_ascii_start(),
@@ -235,7 +343,7 @@ macro_rules! declare_settings {
 
             /// The first setting with a value that it does not take.
             #[must_use]
-            pub fn violation(&self) -> Option<$crate::settings::Violation> {
+            $visibility fn violation(&self) -> Option<$crate::settings::Violation> {
                 let mut settings = Self::SETTINGS.iter();
                 $(
                     let violation = settings.next().and_then(|setting| setting.check(&self.$field));
@@ -300,5 +408,44 @@ mod tests {
         let violation = setting.check(&u64::MAX).unwrap();
         assert_eq!(violation.found, u64::MAX.to_string());
         assert_eq!(setting.check(&EXACT), None);
+    }
+
+    declare_settings! {
+        /// Two settings.
+        struct Lamp {
+            /// How bright it is.
+            brightness: f32 = 1.0, Accepts::within(0.0, 2.0);
+            /// What colour it has.
+            colour: String = "red".to_owned(), Accepts::OneOf(&["red", "blue"]);
+        }
+    }
+
+    fn read(text: &str) -> Result<Lamp, SettingsError> {
+        Lamp::read(&text.parse().unwrap())
+    }
+
+    #[test]
+    fn a_table_is_read_over_the_built_in_values() {
+        assert_eq!(read(""), Ok(Lamp::default()));
+        let lamp = read("brightness = 2").unwrap();
+        assert_eq!((lamp.brightness, &*lamp.colour), (2.0, "red"));
+    }
+
+    #[test]
+    fn a_table_is_refused_with_the_setting_what_was_found_and_what_was_expected() {
+        let message = |text| read(text).unwrap_err().to_string();
+        assert_eq!(message("hue = 1"), "no setting is called `hue`");
+        assert_eq!(
+            message("brightness = 2.5"),
+            "setting `brightness` is 2.5, expected a number in [0, 2]"
+        );
+        assert_eq!(
+            message("brightness = true"),
+            "setting `brightness` is true, expected a number in [0, 2]"
+        );
+        assert_eq!(
+            message("colour = \"green\""),
+            "setting `colour` is \"green\", expected `red` or `blue`"
+        );
     }
 }

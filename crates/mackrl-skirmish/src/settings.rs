@@ -1,6 +1,9 @@
 //! Settings of a skirmish, with the names that SMAC gives them.
 
-use mackrl_env::{declare_settings, settings::Accepts};
+use mackrl_env::{
+    declare_settings,
+    settings::{Accepts, SettingsError, WrongSetting},
+};
 use serde::{Deserialize, Serialize};
 
 use crate::{error::SkirmishError, unit_types::UnitData};
@@ -93,6 +96,29 @@ impl SkirmishSettings {
     #[must_use]
     pub fn aims_within_sight(&self) -> bool {
         self.shoot_range < self.sight_range
+    }
+
+    /// Checks that agents aim no further than they see.
+    pub(crate) fn check_ranges(&self) -> Result<(), SettingsError> {
+        if self.aims_within_sight() {
+            return Ok(());
+        }
+        let (shoot, sight) = (self.shoot_range, self.sight_range);
+        let why = "agents can only aim at what they see";
+        Err(SettingsError::AtOdds(Box::new([
+            WrongSetting {
+                name: "shoot_range".to_owned(),
+                found: format!("{shoot:?}"),
+                expected: format!("less than {sight:?}, which is sight_range: {why}"),
+                nearest: None,
+            },
+            WrongSetting {
+                name: "sight_range".to_owned(),
+                found: format!("{sight:?}"),
+                expected: format!("more than {shoot:?}, which is shoot_range: {why}"),
+                nearest: None,
+            },
+        ])))
     }
 
     /// Checks every range, and that agents aim no further than they see.

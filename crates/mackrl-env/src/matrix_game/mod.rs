@@ -17,7 +17,7 @@ pub use information::{
     CommonKnowledge, Deal, DealtCards, InvalidProbability, Observation, ObservationDistribution,
 };
 pub use payoffs::{ACTIONS, Matrix, Payoffs, payoff, payoff_text};
-pub use world::{MatrixGame, MatrixGameSettings};
+pub use world::{MatrixGame, MatrixGameKind, MatrixGameSettings};
 
 /// The name by which configurations and commands call the game.
 pub const MATRIX_GAME: &str = "matrix-game";

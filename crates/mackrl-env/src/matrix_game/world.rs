@@ -9,13 +9,14 @@
 use std::sync::Arc;
 
 use super::{
-    ACTIONS, AGENTS, DealtCards, InvalidProbability, Matrix, Observation, ObservationDistribution,
-    Payoffs, payoff,
+    ACTIONS, AGENTS, DealtCards, InvalidProbability, MATRIX_GAME, Matrix, Observation,
+    ObservationDistribution, Payoffs, payoff, payoff_text,
 };
 use crate::{
     Action, AgentId, Draw, EntityId, EntitySet, Environment, EnvironmentSpec, EpisodeEnd,
     EpisodeKey, EpisodeStatistics, IllegalAction, KnownEntities, ObservationMut, PriorKnowledge,
-    StepError, TimeStep, declare_settings, settings::Accepts,
+    Prototype, StepError, TimeStep, World, WorldError, WorldKind, declare_settings,
+    settings::{Accepts, Setting, Settings},
 };
 
 const ENTITIES: usize = AGENTS + 1;
@@ -63,7 +64,7 @@ impl MatrixGame {
         Ok(Self {
             settings,
             spec: EnvironmentSpec {
-                name: super::MATRIX_GAME.into(),
+                name: MATRIX_GAME.into(),
                 agents: AGENTS,
                 entities: ENTITIES,
                 entity_features: FEATURES,
@@ -173,6 +174,35 @@ impl Environment for MatrixGame {
     }
 }
 
+/// Matrix games as a kind of world.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct MatrixGameKind;
+
+impl WorldKind for MatrixGameKind {
+    fn name(&self) -> &str {
+        MATRIX_GAME
+    }
+
+    fn summary(&self) -> &str {
+        "the paper's game of one step: two agents, five actions, two payoff matrices"
+    }
+
+    fn settings(&self) -> Vec<Setting> {
+        MatrixGameSettings::DECLARED.to_vec()
+    }
+
+    fn defaults(&self) -> toml::Table {
+        MatrixGameSettings::defaults()
+    }
+
+    fn build(&self, table: &toml::Table) -> Result<Arc<dyn World>, WorldError> {
+        let settings = MatrixGameSettings::read(table)?;
+        let game = MatrixGame::new(settings).expect("the probability is in its range");
+        let world = Prototype::new(MATRIX_GAME, game).data(payoff_text(settings.payoffs));
+        Ok(Arc::new(world))
+    }
+}
+
 /// The rules, which everybody knows.
 #[derive(Debug)]
 struct Rules;
@@ -225,6 +255,25 @@ mod tests {
             common_knowledge,
         })
         .unwrap()
+    }
+
+    #[test]
+    fn its_worlds_are_configured_by_a_table() {
+        let table = "common_knowledge = 1.0\npayoffs = \"printed\"".parse();
+        let world = MatrixGameKind.build(&table.unwrap()).unwrap();
+        assert_eq!((world.kind(), world.name()), (MATRIX_GAME, MATRIX_GAME));
+        assert_eq!(world.data(), payoff_text(Payoffs::Printed));
+        let mut environment = world.make();
+        let mut observations = Observations::new(world.spec(), 1);
+        let key = EpisodeKey::new(1, Stream::Other, 0);
+        environment.reset(key, &mut observations.row_mut(0));
+        assert_eq!(observations.visible(0), [EntitySet::first(ENTITIES); 2]);
+        let wrong = "common_knowledge = 1.5".parse().unwrap();
+        let error = MatrixGameKind.build(&wrong).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "setting `common_knowledge` is 1.5, expected a number in [0, 1]"
+        );
     }
 
     /// Deals `episodes` games and hands each to `check`.

@@ -44,7 +44,7 @@ fn every_shipped_map_is_a_scenario() {
     for name in crate::map_names() {
         let units = UnitTypes::load(UnitData::Liberty).unwrap();
         let shipped = Scenario::shipped(name, &units).unwrap().unwrap();
-        let text = std::fs::read_to_string(format!("../../maps/{name}.toml")).unwrap();
+        let text = std::fs::read_to_string(format!("maps/{name}.toml")).unwrap();
         let custom = parse(name, &text, &units).unwrap();
         assert_eq!(custom.recruits, shipped.recruits, "{name}");
     }
