@@ -208,10 +208,12 @@ pub trait Settings: Default + Serialize + DeserializeOwned {
     /// The first setting with a value that it does not take.
     fn first_violation(&self) -> Option<Violation>;
 
-    /// The built-in values by their names.
+    /// The built-in values by their names, in the order of declaration.
     #[must_use]
     fn defaults() -> toml::Table {
-        toml::Table::try_from(Self::default()).expect("settings are values that TOML has")
+        // By way of the text, in which a number of single precision is what its reader sees: 0.02, not the nearest number.
+        let text = toml::to_string(&Self::default()).expect("settings are values that TOML has");
+        toml::from_str(&text).expect("what was written can be read")
     }
 
     /// Reads a table; what it does not set has its built-in value. Integers are taken for numbers, as people write them.
@@ -292,6 +294,46 @@ impl From<Violation> for SettingsError {
             nearest: None,
         })
     }
+}
+
+/// Declares a choice of a few words: an enum, and how each of its cases is written, once.
+///
+/// A case reads `Case = "word"`. The enum is read and written by these words; `WORDS` lists them, and `ACCEPTS` is what a
+/// setting of this type accepts.
+#[macro_export]
+macro_rules! declare_words {
+    (
+        $(#[$attribute:meta])*
+        pub enum $name:ident {
+            $( $(#[$case_attribute:meta])* $case:ident = $word:literal, )+
+        }
+    ) => {
+        $(#[$attribute])*
+        #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+        pub enum $name {
+            $(
+                $(#[$case_attribute])*
+                #[serde(rename = $word)]
+                $case,
+            )+
+        }
+
+        impl $name {
+            /// How the cases are written, in the order of declaration.
+            pub const WORDS: &'static [&'static str] = &[$($word),+];
+
+            /// What a setting of this type accepts.
+            pub const ACCEPTS: $crate::settings::Accepts = $crate::settings::Accepts::OneOf(Self::WORDS);
+
+            /// How this case is written.
+            #[must_use]
+            pub const fn word(self) -> &'static str {
+                match self {
+                    $(Self::$case => $word,)+
+                }
+            }
+        }
+    };
 }
 
 /// Declares a section of settings: the struct, its built-in values, what it accepts and what that means.
@@ -396,6 +438,44 @@ mod tests {
         let three = Accepts::OneOf(&["a", "b", "c"]);
         assert_eq!(three.to_string(), "`a`, `b` or `c`");
         assert!(!three.admits(&toml::Value::String("d".into())));
+    }
+
+    declare_words! {
+        /// A pace.
+        pub enum Pace {
+            /// One foot before the other.
+            #[default]
+            Walk = "at-a-walk",
+            /// Both off the ground.
+            Run = "running",
+        }
+    }
+
+    declare_settings! {
+        /// How one moves.
+        pub struct Moving {
+            /// The pace.
+            pace: Pace = Pace::Walk, Pace::ACCEPTS;
+            /// Metres of a step.
+            stride: f32 = 0.7, Accepts::above(0.0);
+        }
+    }
+
+    #[test]
+    fn a_word_is_written_once_and_read_accepted_and_listed() {
+        assert_eq!(Pace::ACCEPTS.to_string(), "`at-a-walk` or `running`");
+        for word in Pace::WORDS {
+            let table = toml::Table::from_iter([("pace".to_owned(), (*word).into())]);
+            assert_eq!(Moving::read(&table).unwrap().pace.word(), *word);
+        }
+    }
+
+    #[test]
+    fn defaults_stand_in_the_order_of_declaration_and_as_readers_see_numbers() {
+        assert_eq!(
+            Moving::defaults().to_string(),
+            "pace = \"at-a-walk\"\nstride = 0.7\n"
+        );
     }
 
     #[test]

@@ -1,47 +1,46 @@
 //! Settings of a skirmish, with the names that SMAC gives them.
 
 use mackrl_env::{
-    declare_settings,
+    declare_settings, declare_words,
     settings::{Accepts, SettingsError, WrongSetting},
 };
-use serde::{Deserialize, Serialize};
 
 use crate::{error::SkirmishError, unit_types::UnitData};
 
-/// Which of SMAC's peculiarities are kept.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Compatibility {
-    /// All of them: rewards are absolute values, so enemies whose shields recharge pay the team, and on maps of stalkers and
-    /// zealots the one-hot types of enemies are swapped against those of allies.
-    #[default]
-    Smac,
-    /// None: rewards are cut off at 0, and a type has the same one-hot on both sides.
-    Clean,
+declare_words! {
+    /// Which of SMAC's peculiarities are kept.
+    pub enum Compatibility {
+        /// All of them: rewards are absolute values, so enemies whose shields recharge pay the team, and on maps of stalkers and
+        /// zealots the one-hot types of enemies are swapped against those of allies.
+        #[default]
+        Smac = "smac",
+        /// None: rewards are cut off at 0, and a type has the same one-hot on both sides.
+        Clean = "clean",
+    }
 }
 
-/// What the enemies are told when an episode begins.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum EnemyBehaviour {
-    /// The map's own order. Most maps send the enemies to where the agents started; there they stay, and a team that hides is
-    /// never found.
-    #[default]
-    Map,
-    /// To go for the nearest agent, wherever it is, until none is left.
-    Hunt,
+declare_words! {
+    /// What the enemies are told when an episode begins.
+    pub enum EnemyBehaviour {
+        /// The map's own order. Most maps send the enemies to where the agents started; there they stay, and a team that hides is
+        /// never found.
+        #[default]
+        Map = "map",
+        /// To go for the nearest agent, wherever it is, until none is left.
+        Hunt = "hunt",
+    }
 }
 
 declare_settings! {
     /// How a skirmish is played and shown to agents.
     pub struct SkirmishSettings {
         /// Which statistics units have: those of Wings of Liberty, as SMAC's maps use them, or those of Legacy of the Void.
-        units: UnitData = UnitData::Liberty, Accepts::OneOf(&["liberty", "lotv"]);
+        units: UnitData = UnitData::Liberty, UnitData::ACCEPTS;
         /// Which of SMAC's peculiarities are kept: all (absolute rewards, swapped one-hot types of enemies) or none.
-        compat: Compatibility = Compatibility::Smac, Accepts::OneOf(&["smac", "clean"]);
+        compat: Compatibility = Compatibility::Smac, Compatibility::ACCEPTS;
         /// What the enemies are told when an episode begins: what their map says, or to go for the nearest agent, wherever it is. Not in
         /// SMAC, whose maps say it.
-        enemy_order: EnemyBehaviour = EnemyBehaviour::Map, Accepts::OneOf(&["map", "hunt"]);
+        enemy_order: EnemyBehaviour = EnemyBehaviour::Map, EnemyBehaviour::ACCEPTS;
         /// Map units by which a unit starts beside its place on the map, at most, along each axis; drawn anew for every episode. The
         /// least that keeps mirror images of an army from fighting as one. Not in SMAC, where the engine places units: see
         /// `DEVIATIONS.md`.

@@ -5,6 +5,7 @@
 
 use std::sync::{Arc, OnceLock};
 
+use mackrl_env::declare_words;
 use serde::{Deserialize, Serialize};
 
 use crate::error::SkirmishError;
@@ -12,15 +13,15 @@ use crate::error::SkirmishError;
 /// Game loops in a second at normal speed, the unit of all data.
 pub const LOOPS_PER_SECOND: f32 = 16.0;
 
-/// Which statistics units have.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum UnitData {
-    /// Base Wings of Liberty, on which SMAC's maps depend.
-    #[default]
-    Liberty,
-    /// Legacy of the Void 4.10, which other simulators of these maps follow.
-    Lotv,
+declare_words! {
+    /// Which statistics units have.
+    pub enum UnitData {
+        /// Base Wings of Liberty, on which SMAC's maps depend.
+        #[default]
+        Liberty = "liberty",
+        /// Legacy of the Void 4.10, which other simulators of these maps follow.
+        Lotv = "lotv",
+    }
 }
 
 impl UnitData {

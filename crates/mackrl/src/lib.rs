@@ -10,6 +10,7 @@
 //! `A` action, `C` column of a pair's table (delegate, then A·A joint actions), `F` feature, `G` state, `H` hidden.
 //! The order is always T, B, then the rest.
 
+pub mod algorithms;
 pub mod baselines;
 pub mod central_critic;
 pub mod common_knowledge;

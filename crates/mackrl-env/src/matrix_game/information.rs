@@ -4,25 +4,25 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{AGENTS, Matrix};
+use crate::declare_words;
 
 /// A probability outside [0, 1].
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error("the probability of common knowledge is {0}, expected a number in [0, 1]")]
 pub struct InvalidProbability(pub f64);
 
-/// How the chance of seeing the matrix depends on p, the number on the horizontal axis of Figure 5.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum ObservationDistribution {
-    /// The 2018 paper: the bit is on with probability p; without it each agent sees the matrix with probability 1/2. Private
-    /// knowledge grows with p too: an agent sees the matrix with probability (1 + p)/2.
-    #[default]
-    #[serde(rename = "2018")]
-    Y2018,
-    /// The NeurIPS 2019 version: every agent sees the matrix with probability 3/4 whatever p is; p is the share of that which
-    /// the bit causes. The bit is on with probability 3p/4; without it an agent sees the matrix with probability
-    /// (3/4)(1 − p)/(1 − 3p/4).
-    #[serde(rename = "neurips")]
-    NeurIps2019,
+declare_words! {
+    /// How the chance of seeing the matrix depends on p, the number on the horizontal axis of Figure 5.
+    pub enum ObservationDistribution {
+        /// The 2018 paper: the bit is on with probability p; without it each agent sees the matrix with probability 1/2. Private
+        /// knowledge grows with p too: an agent sees the matrix with probability (1 + p)/2.
+        #[default]
+        Y2018 = "2018",
+        /// The NeurIPS 2019 version: every agent sees the matrix with probability 3/4 whatever p is; p is the share of that which
+        /// the bit causes. The bit is on with probability 3p/4; without it an agent sees the matrix with probability
+        /// (3/4)(1 − p)/(1 − 3p/4).
+        NeurIps2019 = "neurips",
+    }
 }
 
 /// What chance has dealt.

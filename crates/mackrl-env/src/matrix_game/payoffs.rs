@@ -6,6 +6,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::declare_words;
+
 /// A: actions of an agent.
 pub const ACTIONS: usize = 5;
 
@@ -56,15 +58,15 @@ impl Matrix {
     }
 }
 
-/// Which pair of matrices is meant.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Payoffs {
-    /// As in the published code, with which the published figure was made.
-    #[default]
-    Coded,
-    /// As printed in the paper.
-    Printed,
+declare_words! {
+    /// Which pair of matrices is meant.
+    pub enum Payoffs {
+        /// As in the published code, with which the published figure was made.
+        #[default]
+        Coded = "coded",
+        /// As printed in the paper.
+        Printed = "printed",
+    }
 }
 
 /// What the team earns in `matrix` for the joint action `(first, second)`, in [0, 1].

@@ -31,9 +31,9 @@ declare_settings! {
     #[derive(Copy)]
     pub struct MatrixGameSettings {
         /// Which pair of matrices is played: that of the published code, or the one printed in the paper.
-        payoffs: Payoffs = Payoffs::Coded, Accepts::OneOf(&["coded", "printed"]);
+        payoffs: Payoffs = Payoffs::Coded, Payoffs::ACCEPTS;
         /// How often agents see the matrix: as in the 2018 paper, or as in the NeurIPS version.
-        distribution: ObservationDistribution = ObservationDistribution::Y2018, Accepts::OneOf(&["2018", "neurips"]);
+        distribution: ObservationDistribution = ObservationDistribution::Y2018, ObservationDistribution::ACCEPTS;
         /// p, the probability on the horizontal axis of Figure 5.
         common_knowledge: f64 = 0.5, Accepts::within(0.0, 1.0);
     }

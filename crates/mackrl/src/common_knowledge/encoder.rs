@@ -5,8 +5,9 @@
 
 use std::{fmt, sync::Arc};
 
-use mackrl_env::{AgentId, EntityId, EnvironmentSpec, KnownEntities, PriorKnowledge};
-use serde::{Deserialize, Serialize};
+use mackrl_env::{
+    AgentId, EntityId, EnvironmentSpec, KnownEntities, PriorKnowledge, declare_words,
+};
 
 /// Columns that the features of an entity begin with: its position (x, y).
 const POSITION: usize = 2;
@@ -17,16 +18,16 @@ const THIN_ENEMY: usize = 5;
 /// What the thin features hold in place of anything that is not commonly known.
 const MISSING: f32 = -1.0;
 
-/// What a group's controller reads of its common knowledge.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum CommonKnowledgeFeatures {
-    /// All that is known of every entity: place relative to each member, attributes, and each member's commonly known
-    /// available actions. Unknown is 0.
-    #[default]
-    Complete,
-    /// What the published code reads: places and whether enemies can be attacked, without health or type. Unknown is −1.
-    Thin,
+declare_words! {
+    /// What a group's controller reads of its common knowledge.
+    pub enum CommonKnowledgeFeatures {
+        /// All that is known of every entity: place relative to each member, attributes, and each member's commonly known
+        /// available actions. Unknown is 0.
+        #[default]
+        Complete = "complete",
+        /// What the published code reads: places and whether enemies can be attacked, without health or type. Unknown is −1.
+        Thin = "thin",
+    }
 }
 
 /// Turns the common knowledge of groups of one size into controller inputs.

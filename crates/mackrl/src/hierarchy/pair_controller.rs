@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use mackrl_env::{EnvironmentSpec, KnownEntities, PriorKnowledge};
-use serde::{Deserialize, Serialize};
+use mackrl_env::{EnvironmentSpec, KnownEntities, PriorKnowledge, declare_words};
 
 use super::{
     HierarchySettings,
@@ -26,17 +25,17 @@ pub(crate) struct PairController {
     delegation: Delegation,
 }
 
-/// When a pair may delegate; anything but [`Delegation::Learned`] is an ablation.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Delegation {
-    /// The pair controller decides.
-    #[default]
-    Learned,
-    /// Always: the team is as good as independent agents with a central critic.
-    Always,
-    /// Only where the pair commonly knows no joint action.
-    Never,
+declare_words! {
+    /// When a pair may delegate; anything but [`Delegation::Learned`] is an ablation.
+    pub enum Delegation {
+        /// The pair controller decides.
+        #[default]
+        Learned = "learned",
+        /// Always: the team is as good as independent agents with a central critic.
+        Always = "always",
+        /// Only where the pair commonly knows no joint action.
+        Never = "never",
+    }
 }
 
 impl PairController {

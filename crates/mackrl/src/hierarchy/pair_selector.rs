@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 
-use mackrl_env::{AgentId, EnvironmentSpec, KnownEntities, PriorKnowledge};
-use serde::{Deserialize, Serialize};
+use mackrl_env::{AgentId, EnvironmentSpec, KnownEntities, PriorKnowledge, declare_words};
 
 use super::{
     HierarchySettings,
@@ -14,15 +13,15 @@ use crate::{
     nn::{NetworkSizes, ParameterLayout},
 };
 
-/// How the partition is chosen; anything but [`Selection::Learned`] is an ablation.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Selection {
-    /// The pair selector decides.
-    #[default]
-    Learned,
-    /// Each partition in force is as likely as any other, in greedy play too: a draw that all agents share, and no choice.
-    Uniform,
+declare_words! {
+    /// How the partition is chosen; anything but [`Selection::Learned`] is an ablation.
+    pub enum Selection {
+        /// The pair selector decides.
+        #[default]
+        Learned = "learned",
+        /// Each partition in force is as likely as any other, in greedy play too: a draw that all agents share, and no choice.
+        Uniform = "uniform",
+    }
 }
 
 /// The pair selector. It exists only where there is more than one partition to choose from.

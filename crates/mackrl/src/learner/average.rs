@@ -1,17 +1,17 @@
 //! What a step counts for in the policy's loss, when some episodes of a batch are longer than others.
 
-use serde::{Deserialize, Serialize};
+use mackrl_env::declare_words;
 
-/// How the policy's loss is averaged over a batch of episodes.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum LossAverage {
-    /// Over all steps that were played, each alike.
-    #[default]
-    Steps,
-    /// At each time over the episodes that are still played, then over time: late steps of long episodes count for more. So does
-    /// the authors' code.
-    Slots,
+declare_words! {
+    /// How the policy's loss is averaged over a batch of episodes.
+    pub enum LossAverage {
+        /// Over all steps that were played, each alike.
+        #[default]
+        Steps = "steps",
+        /// At each time over the episodes that are still played, then over time: late steps of long episodes count for more. So does
+        /// the authors' code.
+        Slots = "slots",
+    }
 }
 
 impl LossAverage {

@@ -1,0 +1,113 @@
+//! Pairwise MACKRL, the learner of the paper: a pair selector, pair controllers and agent controllers under one central critic.
+
+mod settings;
+
+use mackrl_env::{
+    EnvironmentSpec,
+    settings::{Setting, Settings, SettingsError, WrongSetting},
+};
+
+use crate::{
+    algorithms::{ActorCriticSettings, AlgorithmKind, Automatic, Preset},
+    partition::PartitionSchedule,
+};
+
+pub use settings::{MackrlSettings, PartitionChoice};
+
+/// The kind `mackrl`.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Mackrl;
+
+impl Mackrl {
+    /// The settings of the hierarchy and of its learning, which stand side by side in one table.
+    ///
+    /// # Errors
+    /// As [`Settings::read`].
+    pub fn read(
+        table: &toml::Table,
+    ) -> Result<(MackrlSettings, ActorCriticSettings), SettingsError> {
+        let own =
+            |name: &str| (MackrlSettings::SETTINGS.iter()).any(|setting| setting.name == name);
+        let (mut hierarchy, mut learning) = (toml::Table::new(), toml::Table::new());
+        for (name, value) in table {
+            let part = if own(name) {
+                &mut hierarchy
+            } else {
+                &mut learning
+            };
+            part.insert(name.clone(), value.clone());
+        }
+        Ok((
+            MackrlSettings::read(&hierarchy)?,
+            ActorCriticSettings::read(&learning)?,
+        ))
+    }
+}
+
+impl AlgorithmKind for Mackrl {
+    fn name(&self) -> &'static str {
+        "mackrl"
+    }
+
+    fn summary(&self) -> &'static str {
+        "Pairwise MACKRL: a pair selector, pair controllers and agent controllers."
+    }
+
+    fn settings(&self) -> Vec<Setting> {
+        [MackrlSettings::SETTINGS, ActorCriticSettings::SETTINGS].concat()
+    }
+
+    fn defaults(&self) -> toml::Table {
+        let mut defaults = MackrlSettings::defaults();
+        defaults.extend(ActorCriticSettings::defaults());
+        defaults
+    }
+
+    fn automatic(&self, table: &toml::Table, spec: &EnvironmentSpec) -> Vec<Automatic> {
+        let all = PartitionChoice::All.to_string();
+        let takes_all = table.get("partitions").and_then(toml::Value::as_str) == Some(&*all);
+        if !takes_all || spec.agents <= PartitionSchedule::MOST_AGENTS_ENUMERATED {
+            return Vec::new();
+        }
+        vec![Automatic {
+            name: "partitions",
+            value: PartitionChoice::RoundRobin.to_string().into(),
+            why: "more than 8 agents have too many partitions to take all",
+        }]
+    }
+
+    fn check(
+        &self,
+        table: &toml::Table,
+        spec: &EnvironmentSpec,
+    ) -> Result<toml::Table, SettingsError> {
+        let (settings, learning) = Self::read(table)?;
+        learning.check()?;
+        match settings.partitions.expected_of(spec.agents) {
+            None => Ok(table.clone()),
+            Some(expected) => Err(SettingsError::Wrong(WrongSetting {
+                name: "partitions".to_owned(),
+                found: format!("\"{}\"", settings.partitions),
+                expected: format!("{expected} for the {} agents of {}", spec.agents, spec.name),
+                nearest: None,
+            })),
+        }
+    }
+
+    fn presets(&self) -> &'static [Preset] {
+        &[
+            Preset {
+                name: "default",
+                text: include_str!("presets/default.toml"),
+            },
+            Preset {
+                name: "paper",
+                text: include_str!("presets/paper.toml"),
+            },
+            Preset {
+                name: "paper-code",
+                text: include_str!("presets/paper-code.toml"),
+            },
+        ]
+    }
+}
