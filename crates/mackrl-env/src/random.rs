@@ -37,6 +37,8 @@ pub enum Draw {
     Agent(usize),
     /// The world's n-th draw of this step.
     World(usize),
+    /// The choice of a larger group, by its level in the hierarchy and its number there, shared by its members.
+    Group(usize, usize),
     /// Initial parameters, seeded subsets and other draws made once.
     Setup(usize),
 }
@@ -95,6 +97,7 @@ impl EpisodeKey {
             Draw::Agent(index) => (2, index),
             Draw::World(index) => (3, index),
             Draw::Setup(index) => (4, index),
+            Draw::Group(level, index) => (5, level << 24 | index),
         };
         debug_assert!(index < 1 << 28, "a draw's index has 28 bits");
         debug_assert!(self.episode < 1 << 56, "an episode's number has 56 bits");

@@ -28,6 +28,13 @@ pub enum Error {
     Step(#[from] mackrl_env::StepError),
 }
 
+impl Error {
+    /// That a setting has a value that it does not take.
+    pub(crate) fn setting(error: mackrl_env::settings::SettingsError) -> Self {
+        Self::Config(error.to_string())
+    }
+}
+
 /// A number that is infinite or NaN, and where it turned up.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct NotFinite {

@@ -11,20 +11,20 @@
 //! The order is always T, B, then the rest.
 
 pub mod algorithms;
-pub mod baselines;
-pub mod central_critic;
 pub mod common_knowledge;
+pub mod critics;
 pub mod decentralised;
 mod error;
+pub mod experience;
 pub mod hierarchy;
-pub mod learner;
 pub mod marginalisation;
 pub mod nn;
+pub mod objectives;
 mod parallel;
 pub mod partition;
 pub mod policy;
 mod real;
-pub mod rollout;
+
 pub mod statistics;
 mod stopwatch;
 pub mod tabular;

@@ -8,7 +8,7 @@ use std::{
 
 use anyhow::Context;
 use mackrl::decentralised::{AgentLink, Answer, Certificate, Request, Subject};
-use mackrl_run::training::{assembly, read_weights};
+use mackrl_run::training::assembly;
 use serde_json::Value;
 
 use crate::{
@@ -37,8 +37,7 @@ pub(crate) fn run(args: &CertifyArgs) -> anyhow::Result<()> {
 
 fn certify(folder: &Path, run: &Run, args: &CertifyArgs) -> anyhow::Result<Certificate> {
     let world = sc2::world(&run.config)?;
-    let policy = assembly::policy(&run.config, &world)?;
-    let weights = policy.weights(&read_weights(policy.layout(), &run.weights)?);
+    let algorithm = assembly::trained(&run.config, &world, &run.weights)?;
     let mut links = (0..world.spec().agents)
         .map(|agent| {
             Ok(
@@ -49,12 +48,12 @@ fn certify(folder: &Path, run: &Run, args: &CertifyArgs) -> anyhow::Result<Certi
         .collect::<anyhow::Result<Vec<_>>>()?;
     let mut environment = world.environments(1)?.remove(0);
     let mut subject = Subject {
-        policy: &*policy,
-        weights: &weights,
+        policy: algorithm.policy(),
+        parameters: algorithm.parameters(),
         environment: &mut *environment,
         links: &mut links,
         seed: args.seed.unwrap_or(run.config.run.seed),
-        exploration: run.config.exploration.finish,
+        sampled: algorithm.behaviour(u64::MAX),
     };
     let meter = Meter::new("episodes");
     Ok(subject.certify(args.episodes.get(), |done, total| meter.report(done, total))?)

@@ -4,10 +4,7 @@ use std::io;
 
 use mackrl::decentralised::serve_agent;
 use mackrl_env::AgentId;
-use mackrl_run::training::{
-    assembly::{self, World},
-    read_weights,
-};
+use mackrl_run::training::assembly::{self, World};
 
 use crate::{args::ExecuteAgentArgs, failure::Failure, run_folder::Run};
 
@@ -26,12 +23,11 @@ pub(crate) fn run(args: &ExecuteAgentArgs) -> anyhow::Result<()> {
         let message = format!("--agent is {}, expected less than {agents}", args.agent);
         return Err(Failure::BadData { message }.into());
     }
-    let policy = assembly::policy(&run.config, &world)?;
-    let weights = policy.weights(&read_weights(policy.layout(), &run.weights)?);
-    let mut executor = policy.executor(AgentId::new(args.agent));
+    let algorithm = assembly::trained(&run.config, &world, &run.weights)?;
+    let mut executor = algorithm.policy().executor(AgentId::new(args.agent));
     serve_agent(
         &mut *executor,
-        &weights,
+        algorithm.parameters(),
         io::stdin().lock(),
         io::stdout().lock(),
     )?;

@@ -1,6 +1,6 @@
 //! From a replay to the picture of one of its moments.
 
-use mackrl::policy::Choice;
+use mackrl::policy::GroupChoice;
 use mackrl_env::{AgentId, EntityId, EntitySet, Environment};
 use mackrl_run::replay::Moment;
 use mackrl_skirmish::{
@@ -106,7 +106,7 @@ fn links(opened: &Opened, step: usize) -> Vec<Link> {
         .filter_map(|pair| {
             Some(Link {
                 members: pair.members.map(AgentId::index),
-                is_joint: pair.choice? == Choice::Joint,
+                is_joint: pair.choice? == GroupChoice::Joint,
             })
         })
         .collect()

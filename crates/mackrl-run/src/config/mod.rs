@@ -38,6 +38,6 @@ pub use settings::Setting;
 
 pub use mackrl::{
     common_knowledge::CommonKnowledgeFeatures,
-    hierarchy::{Delegation, Selection},
-    learner::LossAverage,
+    objectives::LossAverage,
+    policy::{Delegation, Selection},
 };

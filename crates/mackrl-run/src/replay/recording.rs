@@ -4,8 +4,9 @@ use std::{ffi::OsStr, path::Path};
 
 use mackrl::{
     Error, NotFinite,
-    central_critic::ValueFunction,
-    policy::{Actor, Behaviour, Recording, Situation, Thought, Weights},
+    algorithms::Algorithm,
+    experience::Experience,
+    policy::{Actor, Behaviour, Recording, Situation, Thought},
 };
 use mackrl_env::{Action, Environment, EpisodeKey, Observations, matrix_game::MATRIX_GAME};
 use mackrl_skirmish::{
@@ -16,10 +17,7 @@ use mackrl_skirmish::{
 use super::{Player, Replay, STEPS_MOST, Step, hexadecimal};
 use crate::{
     config::{Config, EnvironmentConfig},
-    training::{
-        assembly::{self, World},
-        read_weights,
-    },
+    training::assembly::{self, World},
 };
 
 /// Plays the episode `key` by a script.
@@ -73,18 +71,18 @@ pub fn record_policy(
         &config.env,
         (player, key),
         |observations, step, actions| {
-            let value = watched.critic.value(observations.state(0));
+            let value = watched.algorithm.value(observations.state(0));
             let thought = watched.act(observations, step, actions)?;
-            Ok((Some(value), Some(thought)))
+            Ok((value, Some(thought)))
         },
     )
 }
 
 /// A learnt team that is looked at while it plays one episode.
 struct Watched {
-    weights: Weights,
+    algorithm: Box<dyn Algorithm>,
     actor: Box<dyn Actor>,
-    critic: ValueFunction,
+    experience: Experience,
     behaviour: Behaviour,
     keys: [EpisodeKey; 1],
 }
@@ -96,16 +94,14 @@ impl Watched {
         behaviour: Behaviour,
         key: EpisodeKey,
     ) -> Result<Self, Error> {
-        let world = World::new(config)?;
-        let policy = assembly::policy(config, &world)?;
-        let mut critic = ValueFunction::new(world.spec().state_size, config.policy.hidden);
-        critic.load(&read_weights(critic.layout(), weights)?);
-        let mut actor = policy.actor(1);
-        actor.begin(Recording::Off);
+        let algorithm = assembly::trained(config, &World::new(config)?, weights)?;
+        let mut actor = algorithm.policy().actor(1);
+        let mut experience = Experience::default();
+        actor.begin(Recording::Off, &mut experience);
         Ok(Self {
-            weights: policy.weights(&read_weights(policy.layout(), weights)?),
+            algorithm,
             actor,
-            critic,
+            experience,
             behaviour,
             keys: [key],
         })
@@ -124,7 +120,9 @@ impl Watched {
             observations,
             behaviour: self.behaviour,
         };
-        self.actor.act(&self.weights, situation, actions)?;
+        let parameters = self.algorithm.parameters();
+        self.actor
+            .act(parameters, situation, &mut self.experience, actions)?;
         Ok(self.actor.thought(0, situation, actions))
     }
 }

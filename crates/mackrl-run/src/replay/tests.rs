@@ -1,7 +1,7 @@
 use std::io::{Read, Write};
 
 use flate2::{Compression, read::GzDecoder, write::GzEncoder};
-use mackrl::{common_knowledge::common_knowledge, policy::Choice};
+use mackrl::{common_knowledge::common_knowledge, policy::GroupChoice};
 use mackrl_env::{AgentId, EntityId, EntitySet, EpisodeKey, Stream};
 use mackrl_skirmish::SIMULATOR_VERSION;
 
@@ -101,7 +101,7 @@ fn the_probability_of_the_way_is_the_product_of_its_choices() {
                 .find(|pair| pair.members[..] == group[..]);
             let actions: Vec<Action> = group.iter().map(|a| step.actions[a.index()]).collect();
             probability *= match pair {
-                Some(pair) if pair.choice == Some(Choice::Joint) => {
+                Some(pair) if pair.choice == Some(GroupChoice::Joint) => {
                     joint += 1;
                     let mut options = pair.joint.iter();
                     let option = options.find(|option| option.actions[..] == actions[..]);

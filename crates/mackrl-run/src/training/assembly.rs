@@ -4,16 +4,12 @@ use std::{fmt::Debug, sync::Arc};
 
 use mackrl::{
     Error,
-    baselines::CentralV,
-    central_critic::{CriticSettings, ReturnSettings},
-    decentralised::Decentralised,
-    hierarchy::{HierarchySettings, PairwiseMackrl},
-    learner::LearnerSettings,
-    nn::OptimiserKind,
+    algorithms::{self, Algorithm, Team},
 };
 use mackrl_env::{Environment, EnvironmentSpec, PriorKnowledge};
 
-use crate::config::{self, Algorithm, Config, EnvironmentConfig};
+use super::StoredWeights;
+use crate::config::{Config, EnvironmentConfig};
 
 /// Where the worlds of a run come from: the built-in simulator, or something outside this library that can fail.
 pub trait WorldSource: Send + Sync + Debug {
@@ -108,74 +104,78 @@ impl World {
     }
 }
 
-/// The policy that a configuration describes, for a world.
+/// The algorithm that a configuration describes, for a world; its team has learnt nothing. `threads` changes no result.
 ///
 /// # Errors
 /// [`Error::Config`] if the team is too large for the chosen partitions.
-pub fn policy(config: &Config, world: &World) -> Result<Box<dyn Decentralised>, Error> {
-    let hidden = config.policy.hidden;
-    match config.policy.algorithm {
-        Algorithm::CentralV => Ok(Box::new(CentralV::new(world.spec(), hidden))),
-        Algorithm::Mackrl => {
-            let settings = HierarchySettings {
-                common_knowledge: config.policy.common_knowledge,
-                partitions: config.policy.partitions.into(),
-                selector: config.policy.selector,
-                delegation: config.policy.delegation,
-                hidden,
-            };
-            let seed = config.run.seed;
-            Ok(Box::new(PairwiseMackrl::new(
-                world.spec(),
-                world.prior(),
-                &settings,
-                seed,
-            )?))
-        }
-    }
+pub fn algorithm(
+    config: &Config,
+    world: &World,
+    threads: usize,
+) -> Result<Box<dyn Algorithm>, Error> {
+    let (name, table) = algorithm_table(config);
+    let kinds = algorithms::built_in();
+    let kind = kinds.into_iter().find(|kind| kind.name() == name);
+    let kind = kind.ok_or_else(|| Error::Config(format!("no algorithm is called `{name}`")))?;
+    let team = Team {
+        spec: world.spec(),
+        prior: &world.prior(),
+        seed: config.run.seed,
+        threads,
+    };
+    kind.build(&table, team)
 }
 
-/// Bytes that no file of weights or of a checkpoint's tensors exceeds in a run that `config` describes: whoever reads one that
-/// somebody else wrote needs to read no further.
+/// As [`algorithm`], with the weights of a finished run, which are a safetensors file.
 ///
 /// # Errors
-/// As [`World::new`] and [`policy`].
+/// As [`algorithm`], and [`Error::Data`] if the weights are not those of such a team.
+pub fn trained(config: &Config, world: &World, weights: &[u8]) -> Result<Box<dyn Algorithm>, Error> {
+    let mut algorithm = algorithm(config, world, 1)?;
+    algorithm.load(&StoredWeights(weights))?;
+    Ok(algorithm)
+}
+
+/// The algorithm's name and its table.
+fn algorithm_table(config: &Config) -> (String, toml::Table) {
+    let mut whole = config.to_table();
+    let mut table = toml::Table::new();
+    let mut section = |name: &str, prefix: &str, table: &mut toml::Table| {
+        if let Some(toml::Value::Table(own)) = whole.remove(name) {
+            table.extend(
+                own.into_iter()
+                    .map(|(key, value)| (format!("{prefix}{key}"), value)),
+            );
+        }
+    };
+    section("policy", "", &mut table);
+    section("exploration", "exploration_", &mut table);
+    section("learner", "", &mut table);
+    let name = table.remove("algorithm");
+    let name = name
+        .and_then(|name| name.as_str().map(str::to_owned))
+        .unwrap_or_default();
+    if name == "central-v" {
+        for other in ["common_knowledge", "partitions", "selector", "delegation"] {
+            table.remove(other);
+        }
+    }
+    (name, table)
+}
+
+/// Bytes that no file of weights or of a checkpoint's tensors exceeds in a run that `config` describes: a file that a stranger
+/// wrote needs to be read no further.
+///
+/// # Errors
+/// As [`World::new`] and [`algorithm`].
 pub fn tensors_bytes_max(config: &Config) -> Result<usize, Error> {
     const HEADER: usize = 1 << 20;
     /// Parameters, a target copy and two moments.
     const COPIES: usize = 4;
     let mut config = config.clone();
     config.env = config.env.simulated();
-    let world = World::new(&config)?;
-    let critic = config.policy.hidden * (world.spec().state_size + 8);
-    let parameters = policy(&config, &world)?.layout().len() + critic;
+    let algorithm = algorithm(&config, &World::new(&config)?, 1)?;
+    let models = algorithm.models();
+    let parameters: usize = models.iter().map(|(layout, _)| layout.len()).sum();
     Ok(HEADER + COPIES * parameters * size_of::<f32>())
-}
-
-/// How the learner learns.
-#[must_use]
-pub fn learner(config: &Config) -> LearnerSettings {
-    let settings = &config.learner;
-    let optimiser = match settings.optimiser {
-        config::OptimiserKind::Adam => OptimiserKind::ADAM,
-        config::OptimiserKind::Rmsprop => OptimiserKind::RMSPROP,
-    };
-    LearnerSettings {
-        optimiser,
-        learning_rate: settings.learning_rate,
-        gradient_norm_max: settings.gradient_norm_max,
-        average: config.learner.loss_average,
-        critic: CriticSettings {
-            hidden: config.policy.hidden,
-            optimiser,
-            learning_rate: settings.critic_learning_rate,
-            gradient_norm_max: settings.gradient_norm_max,
-            returns: ReturnSettings {
-                gamma: settings.gamma,
-                lambda: settings.lambda,
-            },
-            target_interval_updates: settings.target_interval_updates,
-            bootstrap_at_time_limit: settings.bootstrap_at_time_limit,
-        },
-    }
 }

@@ -1,6 +1,6 @@
 //! Two trainers side by side: where what they play and what they learn first differs.
 
-use mackrl::{Error, NotFinite, nn::ParameterLayout, rollout::Episode};
+use mackrl::{Error, NotFinite, experience::Episode, nn::ParameterLayout};
 use safetensors::{SafeTensors, tensor::TensorView};
 use serde::{Deserialize, Serialize};
 
@@ -85,8 +85,8 @@ impl Trainer {
     /// differ in it the first. Episodes are numbered from the beginning of the run.
     pub fn compare_batches(&mut self, other: &mut Self) -> Option<Difference> {
         let first_episode = usize::try_from(self.episodes_before_batch()).unwrap_or(usize::MAX);
-        let own: Vec<&Episode> = episodes(self);
-        let others: Vec<&Episode> = episodes(other);
+        let own = self.latest();
+        let others = other.latest();
         if own.len() != others.len() {
             let counts = [own.len() as f64, others.len() as f64];
             return Some(Difference::new("number of episodes", &[], counts));
@@ -103,25 +103,17 @@ impl Trainer {
             .map(|(_, _, difference)| difference)
     }
 
-    /// The first parameter in which the policies or the critics of two trainers differ.
+    /// The first parameter in which the models of two trainers differ.
     #[must_use]
     pub fn compare_parameters(&self, other: &Self) -> Option<Difference> {
-        let critics = [&self.learner, &other.learner].map(|learner| learner.critic());
-        let policies = (self.policy.layout(), self.learner.parameters());
-        compare_models(
-            policies,
-            (other.policy.layout(), other.learner.parameters()),
-        )
-        .or_else(|| {
-            let [own, other] = critics.map(|critic| (critic.layout(), critic.parameters()));
-            compare_models(own, other)
-        })
+        let (own, others) = (self.models(), other.models());
+        if own.len() != others.len() {
+            let counts = [own.len() as f64, others.len() as f64];
+            return Some(Difference::new("number of models", &[], counts));
+        }
+        let mut both = own.into_iter().zip(others);
+        both.find_map(|(own, other)| compare_models(own, other))
     }
-}
-
-fn episodes(trainer: &mut Trainer) -> Vec<&Episode> {
-    let batches = trainer.rollout.batches();
-    batches.flat_map(|batch| &batch.episodes).collect()
 }
 
 /// The first step that differs, what of it, which feature, and the two numbers.

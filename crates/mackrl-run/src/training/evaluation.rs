@@ -4,14 +4,14 @@ use std::sync::{Arc, atomic::AtomicBool};
 
 use mackrl::{
     Error,
-    policy::{Behaviour, Policy, Recording, Tally, Weights},
-    rollout::{Rollout, RolloutSettings},
+    experience::{Collector, PlaySettings},
+    policy::{Behaviour, Parameters, Policy, Recording, Tally},
     statistics::mean_and_standard_error,
 };
 use mackrl_env::{EpisodeKey, Stream};
 use serde::{Deserialize, Serialize};
 
-use super::{assembly, read_weights};
+use super::assembly;
 use crate::config::Config;
 
 /// Episodes that are played at once.
@@ -92,11 +92,9 @@ pub fn evaluate_in(
     episodes: Episodes,
     threads: usize,
 ) -> Result<Evaluation, Error> {
-    let policy = assembly::policy(config, world)?;
-    let parameters = read_weights(policy.layout(), weights)?;
-    let mut evaluator = Evaluator::new(&*policy, world, episodes.count, threads)?;
-    let weights = policy.weights(&parameters);
-    evaluator.play(&weights, episodes.count, |episode| {
+    let algorithm = assembly::trained(config, world, weights)?;
+    let mut evaluator = Evaluator::new(algorithm.policy(), world, episodes.count, threads)?;
+    evaluator.play(algorithm.parameters(), episodes.count, |episode| {
         EpisodeKey::new(episodes.seed, Stream::Evaluation, episode)
     })
 }
@@ -104,7 +102,7 @@ pub fn evaluate_in(
 /// Environments in which greedy episodes are played.
 #[derive(Debug)]
 pub(super) struct Evaluator {
-    rollout: Rollout,
+    collector: Collector,
 }
 
 impl Evaluator {
@@ -117,44 +115,41 @@ impl Evaluator {
     ) -> Result<Self, Error> {
         let parallel_max = world.source().parallel_max().unwrap_or(PARALLEL_EPISODES);
         let environments = world.environments(episodes.clamp(1, parallel_max.max(1)))?;
+        let shards = environments.len().div_ceil(SHARD_SIZE);
         Ok(Self {
-            rollout: Rollout::new(policy, environments, SHARD_SIZE, threads),
+            collector: Collector::new(policy, environments, shards, threads),
         })
     }
 
     /// Gives up playing as soon as `stop` is set.
     pub(super) fn stop_when(&mut self, stop: &Arc<AtomicBool>) {
-        self.rollout.stop_when(stop);
+        self.collector.stop_when(stop);
     }
 
     /// Episodes that were played in vain because a world failed.
     pub(super) fn discarded(&self) -> u64 {
-        self.rollout.discarded()
-    }
-
-    /// What the latest episodes were played with.
-    pub(super) const fn rollout(&mut self) -> &mut Rollout {
-        &mut self.rollout
+        self.collector.discarded()
     }
 
     /// Plays `episodes` greedy episodes, of which number `i` is named `key(i)`.
     pub(super) fn play(
         &mut self,
-        weights: &Weights,
+        parameters: &Parameters,
         episodes: usize,
         key: impl Fn(u64) -> EpisodeKey,
     ) -> Result<Evaluation, Error> {
-        let settings = RolloutSettings {
+        let settings = PlaySettings {
             behaviour: Behaviour::GREEDY,
             recording: Recording::Off,
         };
         let mut samples: [Vec<f64>; 5] = Default::default();
         let mut tally = Tally::default();
         let keys: Vec<EpisodeKey> = (0..episodes as u64).map(key).collect();
-        for keys in keys.chunks(self.rollout.environments()) {
-            self.rollout.play(weights, keys, settings)?;
-            tally.merge(&self.rollout.tally());
-            for episode in self.rollout.batches().flat_map(|batch| &batch.episodes) {
+        for keys in keys.chunks(self.collector.environments()) {
+            self.collector.play(parameters, keys, settings)?;
+            tally.merge(&self.collector.tally());
+            let pieces = self.collector.pieces();
+            for episode in pieces.flat_map(|piece| &piece.experience.episodes) {
                 let statistics = episode.statistics;
                 let numbers = [
                     f64::from(u8::from(statistics.battle_won)),

@@ -1,6 +1,6 @@
 //! A hash of everything that a run has learnt from, by which two runs can be told apart at any row of metrics.
 
-use mackrl::rollout::Episode;
+use mackrl::experience::Episode;
 
 /// An odd number without a pattern: 2⁶⁴ divided by the golden ratio.
 const MULTIPLIER: u64 = 0x9E37_79B9_7F4A_7C15;

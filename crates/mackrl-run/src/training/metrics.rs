@@ -5,7 +5,7 @@
 
 use serde::{Serialize, Serializer, ser::SerializeMap};
 
-/// A metric's name (or the part before a number) and what it means.
+/// A metric's name (or the part before a number) and what it means, of everything that does not depend on the algorithm.
 ///
 /// Means are over the interval since the last row, weighted by how often the thing occurred.
 pub const METRICS: &[(&str, &str)] = &[
@@ -19,7 +19,6 @@ pub const METRICS: &[(&str, &str)] = &[
         "experience_hash",
         "hash of all states and rewards of the training episodes so far, in 16 hexadecimal digits",
     ),
-    ("epsilon", "ε of the bounded softmax in the latest batch"),
     (
         "return_mean",
         "mean undiscounted return of training episodes",
@@ -41,53 +40,6 @@ pub const METRICS: &[(&str, &str)] = &[
         "mean number of enemies defeated in an episode",
     ),
     (
-        "pg_loss",
-        "−mean of A_t log p(u_t), divided by the number of agents",
-    ),
-    (
-        "agent_grad_norm",
-        "norm of the policy's gradient before clipping",
-    ),
-    (
-        "advantage_mean",
-        "mean of A_t = r_t + γ V(s_{t+1}) − V(s_t)",
-    ),
-    (
-        "critic_loss",
-        "mean squared error of V to its λ-returns over a sweep",
-    ),
-    (
-        "critic_grad_norm",
-        "mean norm of the critic's gradients before clipping",
-    ),
-    ("td_error_abs", "mean |λ-return − V|"),
-    ("target_mean", "mean λ-return"),
-    (
-        "mackrl/delegation_rate",
-        "share of chosen pairs with common knowledge that delegated",
-    ),
-    (
-        "mackrl/delegation_rate_ck_enemies_",
-        "the same, for pairs that commonly know this many enemies (Figure 7)",
-    ),
-    (
-        "mackrl/common_knowledge_rate",
-        "share of chosen pairs of living agents with common knowledge",
-    ),
-    (
-        "mackrl/ck_entities_mean",
-        "entities that a chosen pair of living agents commonly knows",
-    ),
-    ("mackrl/entropy_l1", "entropy of the pair selector, in nats"),
-    (
-        "mackrl/entropy_l2",
-        "entropy of chosen pair controllers with common knowledge, in nats",
-    ),
-    (
-        "mackrl/entropy_l3",
-        "entropy of living agents' controllers, in nats",
-    ),
-    (
         "test_battle_won_mean",
         "share of greedy test episodes that were won",
     ),
@@ -106,14 +58,6 @@ pub const METRICS: &[(&str, &str)] = &[
     (
         "test_dead_enemies_mean",
         "mean number of enemies defeated in a greedy test episode",
-    ),
-    (
-        "test_mackrl/delegation_rate",
-        "as `mackrl/delegation_rate`, in greedy test episodes",
-    ),
-    (
-        "test_mackrl/delegation_rate_ck_enemies_",
-        "as `mackrl/delegation_rate_ck_enemies_`, in greedy test episodes",
     ),
     (
         "sys/episodes_discarded",
@@ -155,13 +99,9 @@ pub struct MetricRow {
 }
 
 impl MetricRow {
-    /// Appends a number under a name that [`METRICS`] explains.
+    /// Appends a number under a name that [`METRICS`] or the algorithm explains.
     pub fn push(&mut self, name: impl Into<String>, value: f64) {
         let name = name.into();
-        debug_assert!(
-            is_explained(&name),
-            "metric `{name}` is not explained in METRICS"
-        );
         self.entries.push((name, value));
     }
 
@@ -222,8 +162,15 @@ const fn as_count(value: f64) -> u64 {
     value as u64
 }
 
-pub(super) fn is_explained(name: &str) -> bool {
-    METRICS.iter().any(|(explained, _)| {
+/// Whether [`METRICS`] or the metrics of an algorithm, which may begin with `test_` for greedy episodes, explain a name.
+#[must_use]
+pub fn is_explained(name: &str, of_algorithm: &[(&str, &str)]) -> bool {
+    let own = name.strip_prefix("test_").unwrap_or(name);
+    explains(METRICS, name) || explains(of_algorithm, own)
+}
+
+fn explains(metrics: &[(&str, &str)], name: &str) -> bool {
+    metrics.iter().any(|(explained, _)| {
         name.strip_prefix(explained).is_some_and(|rest| {
             rest.is_empty() || explained.ends_with('_') && rest.bytes().all(|b| b.is_ascii_digit())
         })
@@ -248,8 +195,17 @@ mod tests {
 
     #[test]
     fn only_explained_names_and_numbered_ones_are_known() {
-        assert!(is_explained("mackrl/delegation_rate_ck_enemies_12"));
-        assert!(!is_explained("mackrl/delegation_rate_ck_enemies_x"));
-        assert!(!is_explained("t_envy"));
+        let own = [("rate_by_enemies_", ""), ("loss", "")];
+        for name in [
+            "rate_by_enemies_12",
+            "test_rate_by_enemies_0",
+            "loss",
+            "t_env",
+        ] {
+            assert!(is_explained(name, &own), "{name}");
+        }
+        for name in ["rate_by_enemies_x", "t_envy", "losses"] {
+            assert!(!is_explained(name, &own), "{name}");
+        }
     }
 }

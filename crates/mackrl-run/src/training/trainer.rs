@@ -7,33 +7,26 @@ use std::{
 
 use mackrl::{
     Error, Moment, Phase, Stopwatch,
-    decentralised::Decentralised,
-    learner::{Learner, UpdateReport},
-    policy::{Behaviour, Recording, Tally},
-    rollout::{Episode, Rollout, RolloutSettings},
+    algorithms::Algorithm,
+    experience::{Collector, Episode, Piece, PlaySettings},
+    nn::ParameterLayout,
+    policy::{Recording, Tally},
 };
 use mackrl_env::{EpisodeKey, Stream};
 
 use super::{
-    Checkpoint, Evaluation, MetricRow, assembly,
-    checkpoint::{Counters, Layouts, State},
-    evaluation::Evaluator,
-    experience::ExperienceHash,
-    read_weights, write_weights,
+    Checkpoint, Evaluation, MetricRow, StoredWeights, assembly, checkpoint::Counters,
+    evaluation::Evaluator, experience::ExperienceHash, metrics::is_explained, write_weights,
 };
 use crate::config::Config;
-
-/// Environments of a shard: half of the paper's eight, so that two cores have one shard each.
-const SHARD_SIZE: usize = 4;
 
 /// Trains one team.
 pub struct Trainer {
     config: Config,
     world: assembly::World,
-    pub(super) policy: Box<dyn Decentralised>,
-    pub(super) learner: Learner,
-    pub(super) rollout: Rollout,
-    pub(super) evaluator: Evaluator,
+    algorithm: Box<dyn Algorithm>,
+    collector: Collector,
+    evaluator: Evaluator,
     steps_env: u64,
     episodes: u64,
     tests: u64,
@@ -72,16 +65,24 @@ impl Trainer {
         world: &assembly::World,
         threads: usize,
     ) -> Result<Self, Error> {
-        let policy = assembly::policy(config, world)?;
-        let environments = world.environments(config.learner.environments)?;
-        let sizes = [world.spec().agents, world.spec().state_size];
-        let settings = assembly::learner(config);
+        let algorithm = assembly::algorithm(config, world, threads)?;
+        Self::of(algorithm, config, world, threads)
+    }
+
+    /// As [`Trainer::in_world`], of an algorithm that was built.
+    fn of(
+        algorithm: Box<dyn Algorithm>,
+        config: &Config,
+        world: &assembly::World,
+        threads: usize,
+    ) -> Result<Self, Error> {
+        let (policy, shards) = (algorithm.policy(), algorithm.shards());
+        let environments = world.environments(algorithm.environments())?;
         Ok(Self {
-            learner: Learner::new(&*policy, sizes, settings, config.run.seed, threads),
-            rollout: Rollout::new(&*policy, environments, SHARD_SIZE, threads),
-            evaluator: Evaluator::new(&*policy, world, config.test.episodes, threads)?,
+            collector: Collector::new(policy, environments, shards, threads),
+            evaluator: Evaluator::new(policy, world, config.test.episodes, threads)?,
             world: world.clone(),
-            policy,
+            algorithm,
             config: config.clone(),
             steps_env: 0,
             episodes: 0,
@@ -105,9 +106,9 @@ impl Trainer {
         threads: usize,
         checkpoint: &Checkpoint,
     ) -> Result<Self, Error> {
-        let policy = assembly::policy(config, world)?;
-        read_weights(policy.layout(), &checkpoint.tensors)?;
-        let mut trainer = Self::in_world(config, world, threads)?;
+        let mut algorithm = assembly::algorithm(config, world, threads)?;
+        algorithm.load(&StoredWeights(&checkpoint.tensors))?;
+        let mut trainer = Self::of(algorithm, config, world, threads)?;
         trainer.restore(checkpoint)?;
         Ok(trainer)
     }
@@ -115,7 +116,7 @@ impl Trainer {
     /// Lets [`Self::update`] give up, with [`Error::Stopped`], as soon as `stop` is set: episodes of large teams, and long tests,
     /// last longer than somebody who wants to stop should wait.
     pub fn stop_when(&mut self, stop: &Arc<AtomicBool>) {
-        self.rollout.stop_when(stop);
+        self.collector.stop_when(stop);
         self.evaluator.stop_when(stop);
     }
 
@@ -137,8 +138,9 @@ impl Trainer {
     ///
     /// # Errors
     /// [`Error::NotFinite`] if a number is not finite: one that an environment gives, a logit, a number of the critic's, a
-    /// gradient, a moment or a parameter after the step. [`Error::Step`] if a world cannot be played in any more,
-    /// [`Error::Stopped`] if asked to stop. The trainer is as it was before then, and can make the same update again.
+    /// gradient, a moment or a parameter after the step; the trainer is not to be used any more then, and a run resumed from
+    /// its latest checkpoint repeats the failure. [`Error::Step`] if a world cannot be played in any more, [`Error::Stopped`] if
+    /// asked to stop: the trainer is as it was before then, and can make the same update again.
     pub fn update(&mut self) -> Result<Option<MetricRow>, Error> {
         if self.is_test_due() {
             return self.test().map(Some);
@@ -148,20 +150,29 @@ impl Trainer {
         Ok(self.row_of_batch())
     }
 
-    /// The weights of the policy and of the critic as safetensors.
+    /// The weights of the policy and of whatever else the algorithm keeps, as safetensors.
     #[must_use]
     pub fn weights(&self) -> Vec<u8> {
-        let critic = self.learner.critic();
-        write_weights(&[
-            (self.policy.layout(), self.learner.parameters()),
-            (critic.layout(), critic.parameters()),
-        ])
+        write_weights(&self.algorithm.models())
+    }
+
+    /// The latest batch.
+    pub(super) fn latest(&mut self) -> Vec<&Episode> {
+        let pieces = self.collector.pieces();
+        pieces
+            .flat_map(|piece| &piece.experience.episodes)
+            .collect()
+    }
+
+    /// What is kept of the algorithm when training is over.
+    pub(super) fn models(&self) -> Vec<(&ParameterLayout, &[f32])> {
+        self.algorithm.models()
     }
 
     /// Starts measuring where the time goes; until then, that costs nothing.
     pub fn start_stopwatch(&mut self) {
         self.stopwatch.start();
-        self.rollout.stopwatches().for_each(Stopwatch::start);
+        self.collector.stopwatches().for_each(Stopwatch::start);
     }
 
     /// Where the time since [`Self::start_stopwatch`] went: wall-clock time, that of a rollout divided in the proportions of
@@ -173,8 +184,8 @@ impl Trainer {
 
     /// Updates and tests so far: the number of times that [`update`](Self::update) went well in this run, resumptions included.
     #[must_use]
-    pub const fn iterations(&self) -> u64 {
-        self.learner.updates() + self.tests
+    pub fn iterations(&self) -> u64 {
+        self.algorithm.updates() + self.tests
     }
 
     /// Hash of all states and rewards of the training episodes so far: once two runs differ in it, they do so for ever.
@@ -184,27 +195,24 @@ impl Trainer {
     }
 
     /// Training episodes before the latest batch.
-    pub(super) const fn episodes_before_batch(&self) -> u64 {
+    pub(super) fn episodes_before_batch(&self) -> u64 {
         self.episodes.saturating_sub(self.batch())
     }
 
     /// Everything that the rest of the run depends on, the configuration aside.
     #[must_use]
     pub fn checkpoint(&self) -> Checkpoint {
-        let state = State {
-            learner: self.learner.state(),
-            counters: Counters {
-                steps_env: self.steps_env,
-                episodes: self.episodes,
-                tests: self.tests,
-                experience_hash: self.experience.0,
-                next_test: self.next_test,
-                next_row: self.next_row,
-                interval_steps_env: self.interval.steps_env,
-                interval: self.interval.tally.clone(),
-            },
+        let counters = Counters {
+            steps_env: self.steps_env,
+            episodes: self.episodes,
+            tests: self.tests,
+            experience_hash: self.experience.0,
+            next_test: self.next_test,
+            next_row: self.next_row,
+            interval_steps_env: self.interval.steps_env,
+            interval: self.interval.tally.clone(),
         };
-        Checkpoint::write(&self.layouts(), &state)
+        Checkpoint::write(&self.algorithm.state(), &counters)
     }
 
     /// Continues where `checkpoint` was taken: what follows is the same to the byte as if there had been no interruption.
@@ -212,8 +220,10 @@ impl Trainer {
     /// # Errors
     /// [`Error::Data`] if the checkpoint is damaged or belongs to another configuration. Nothing has changed then.
     pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), Error> {
-        let State { learner, counters } = checkpoint.read(&self.layouts())?;
-        self.learner.restore(&*self.policy, learner);
+        let metrics = self.algorithm.metrics();
+        let opened = checkpoint.open(|name| is_explained(name, metrics))?;
+        self.algorithm.restore(&opened)?;
+        let counters = opened.trainer;
         self.steps_env = counters.steps_env;
         self.episodes = counters.episodes;
         self.tests = counters.tests;
@@ -228,38 +238,23 @@ impl Trainer {
         Ok(())
     }
 
-    fn layouts(&self) -> Layouts<'_> {
-        Layouts {
-            policy: self.policy.layout(),
-            critic: self.learner.critic().layout(),
-            optimiser: assembly::learner(&self.config).optimiser,
-        }
-    }
-
     /// Whether the next iteration is a test.
     pub(super) const fn is_test_due(&self) -> bool {
         self.steps_env >= self.next_test
     }
 
     /// What a number that is not finite is dated with.
-    const fn moment(&self) -> Moment {
+    fn moment(&self) -> Moment {
         Moment {
-            update: self.learner.updates(),
+            update: self.algorithm.updates(),
             steps_env: self.steps_env,
         }
     }
 
-    /// ε of the bounded softmax now: it falls linearly with the environment steps.
-    fn exploration(&self) -> f64 {
-        let schedule = &self.config.exploration;
-        let progress = (self.steps_env as f64 / schedule.steps_env as f64).min(1.0);
-        schedule.start + (schedule.finish - schedule.start) * progress
-    }
-
     /// Plays a batch of training episodes.
     pub(super) fn play(&mut self) -> Result<(), Error> {
-        let settings = RolloutSettings {
-            behaviour: Behaviour::sampled(self.exploration()),
+        let settings = PlaySettings {
+            behaviour: self.algorithm.behaviour(self.steps_env),
             recording: Recording::ForLearning,
         };
         let moment = self.moment();
@@ -268,30 +263,31 @@ impl Trainer {
             .map(|episode| EpisodeKey::new(seed, Stream::Training, episode))
             .collect();
         self.stopwatch.lap(Phase::Other);
-        self.rollout
-            .play(self.learner.weights(), &keys, settings)
+        self.collector
+            .play(self.algorithm.parameters(), &keys, settings)
             .map_err(|error| dated(error, moment))?;
-        self.stopwatch.lap_shared_by(self.rollout.stopwatches());
+        self.stopwatch.lap_shared_by(self.collector.stopwatches());
         Ok(())
     }
 
     /// Learns from the batch that was played last.
     pub(super) fn learn_from_batch(&mut self) -> Result<(), Error> {
-        let (exploration, moment) = (self.exploration(), self.moment());
-        let batches = self.rollout.batches().collect();
+        let moment = self.moment();
+        let mut batch: Vec<&mut Piece> = self.collector.pieces().collect();
         self.stopwatch.lap(Phase::Other);
         let report = self
-            .learner
-            .update(&*self.policy, batches, &mut self.stopwatch)
-            .map_err(|broken| dated(broken.into(), moment))?;
+            .algorithm
+            .learn(&mut batch, &mut self.stopwatch)
+            .map_err(|error| dated(error, moment))?;
         self.episodes += self.batch();
-        for episode in self.rollout.batches().flat_map(|batch| &batch.episodes) {
+        let pieces = self.collector.pieces();
+        for episode in pieces.flat_map(|piece| &piece.experience.episodes) {
             self.steps_env += episode.steps() as u64;
             self.experience.add(episode);
             self.interval.note_episode(episode);
         }
-        self.interval.note_update(&report, exploration);
-        self.interval.tally.merge(&self.rollout.tally());
+        self.interval.tally.merge(&report);
+        self.interval.tally.merge(&self.collector.tally());
         Ok(())
     }
 
@@ -305,8 +301,8 @@ impl Trainer {
     }
 
     /// Episodes of a batch.
-    const fn batch(&self) -> u64 {
-        self.config.learner.environments as u64
+    fn batch(&self) -> u64 {
+        self.algorithm.environments() as u64
     }
 
     /// Plays greedy test episodes.
@@ -317,7 +313,7 @@ impl Trainer {
         let (seed, first) = (self.config.run.seed, self.tests * test.episodes as u64);
         let evaluation = self
             .evaluator
-            .play(self.learner.weights(), test.episodes, |episode| {
+            .play(self.algorithm.parameters(), test.episodes, |episode| {
                 EpisodeKey::new(seed, Stream::Test, first + episode)
             })
             .map_err(|error| dated(error, moment))?;
@@ -340,7 +336,7 @@ impl Trainer {
         let mut row = MetricRow::default();
         row.push("t_env", self.steps_env as f64);
         row.push("episode", self.episodes as f64);
-        row.push("update", self.learner.updates() as f64);
+        row.push("update", self.algorithm.updates() as f64);
         row.set_experience_hash(self.experience.0);
         interval
             .tally
@@ -353,7 +349,7 @@ impl Trainer {
                 played / interval.began.elapsed().as_secs_f64().max(1e-9),
             );
         }
-        let discarded = self.rollout.discarded() + self.evaluator.discarded();
+        let discarded = self.collector.discarded() + self.evaluator.discarded();
         if discarded > 0 {
             row.push("sys/episodes_discarded", discarded as f64);
         }
@@ -394,18 +390,6 @@ impl Interval {
         );
         tally.add("dead_allies_mean", statistics.dead_allies as f64, 1.0);
         tally.add("dead_enemies_mean", statistics.dead_enemies as f64, 1.0);
-    }
-
-    fn note_update(&mut self, report: &UpdateReport, exploration: f64) {
-        let mut add = |name: &str, value: f64| self.tally.add(name, value, 1.0);
-        add("epsilon", exploration);
-        add("pg_loss", report.policy_loss);
-        add("agent_grad_norm", report.policy_gradient_norm);
-        add("advantage_mean", report.advantage_mean);
-        add("critic_loss", report.critic.loss);
-        add("critic_grad_norm", report.critic.gradient_norm);
-        add("td_error_abs", report.critic.td_error_abs);
-        add("target_mean", report.critic.target_mean);
     }
 }
 
@@ -455,18 +439,6 @@ mod tests {
             trainer.update().unwrap();
             undisturbed.update().unwrap();
             assert!(trainer.checkpoint() == undisturbed.checkpoint());
-        }
-    }
-
-    #[test]
-    fn exploration_falls_linearly_and_then_stays() {
-        let mut config = Config::default();
-        config.policy.hidden = 2;
-        let mut trainer = Trainer::new(&config, 1).unwrap();
-        for (steps, expected) in [(0, 0.5), (12_500, 0.3775), (50_000, 0.01), (70_000, 0.01)] {
-            trainer.steps_env = steps;
-            let found = trainer.exploration();
-            assert!((found - expected).abs() < 1e-12, "{steps}: {found}");
         }
     }
 }

@@ -2,9 +2,24 @@
 
 use mackrl::{
     Error,
+    algorithms::StoredState,
     nn::{ParameterLayout, TensorSpec},
 };
 use safetensors::{Dtype, SafeTensors, tensor::TensorView};
+
+/// A safetensors file of parameters.
+#[derive(Debug, Clone, Copy)]
+pub struct StoredWeights<'a>(pub &'a [u8]);
+
+impl StoredState for StoredWeights<'_> {
+    fn tensors(&self, layout: &ParameterLayout) -> Result<Vec<f32>, Error> {
+        read_weights(layout, self.0)
+    }
+
+    fn counter(&self, name: &str) -> Result<u64, Error> {
+        Err(Error::Data(format!("weights have no count `{name}`")))
+    }
+}
 
 /// Serialises the tensors of several models side by side.
 ///

@@ -2,22 +2,107 @@
 //!
 //! An algorithm declares its own settings, what they mean and which go together, and brings its presets along, so that
 //! configurations, help texts, explanations and schemas follow from its folder. Adding one takes that folder and a line in
-//! [`built_in`].
+//! [`built_in`]. Nothing here is closed: a program adds [`AlgorithmKind`]s of its own to its registry.
 
 mod actor_critic;
 mod central_v;
 mod mackrl;
+mod state;
 
 use std::{fmt::Debug, sync::Arc};
 
 use mackrl_env::{
-    EnvironmentSpec,
+    EnvironmentSpec, PriorKnowledge,
     settings::{Setting, SettingsError},
 };
 
-pub use actor_critic::{ActorCriticSettings, OptimiserName};
+pub use actor_critic::{ActorCritic, ActorCriticSettings, OptimiserName};
 pub use central_v::CentralV;
 pub use mackrl::{Mackrl, MackrlSettings, PartitionChoice};
+pub use state::{AlgorithmState, StoredState};
+
+use crate::{
+    Error, Stopwatch,
+    experience::Piece,
+    nn::ParameterLayout,
+    policy::{Behaviour, Parameters, Policy, Tally},
+};
+
+/// What learns: a policy, its parameters, and how both change.
+///
+/// A run plays batches of episodes with [`policy`](Self::policy) and [`parameters`](Self::parameters), hands them to
+/// [`learn`](Self::learn), tests, and stores [`state`](Self::state); it knows nothing else of an algorithm.
+pub trait Algorithm: Send + Debug {
+    /// What acts.
+    fn policy(&self) -> &dyn Policy;
+
+    /// What it acts with at present.
+    fn parameters(&self) -> &Parameters;
+
+    /// Environments that are played at once: each gives one episode to a batch.
+    fn environments(&self) -> usize;
+
+    /// Pieces into which a batch is cut for work in parallel. It decides bits, so it is a setting.
+    fn shards(&self) -> usize;
+
+    /// How choices are made in training, when `steps_env` environment steps have been played.
+    fn behaviour(&self, steps_env: u64) -> Behaviour;
+
+    /// Learns from a batch of episodes, books the time that it takes, and gives what it has to report: sums under names that
+    /// [`metrics`](Self::metrics) explains.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] if a number is infinite or NaN: the state is not to be used any more then. [`Error::Data`] if the
+    /// batch holds no step, or was played by another policy.
+    fn learn(
+        &mut self,
+        batch: &mut [&mut Piece],
+        stopwatch: &mut Stopwatch,
+    ) -> Result<Tally, Error>;
+
+    /// Policy updates so far.
+    fn updates(&self) -> u64;
+
+    /// Names (or the parts before a number) and meanings of what [`learn`](Self::learn) and the policy's actors report.
+    fn metrics(&self) -> &'static [(&'static str, &'static str)];
+
+    /// The parameters of the policy and of whatever else is worth keeping when training is over.
+    fn models(&self) -> Vec<(&ParameterLayout, &[f32])>;
+
+    /// Everything that the future of the algorithm depends on, its settings aside.
+    fn state(&self) -> AlgorithmState;
+
+    /// Continues from a stored state.
+    ///
+    /// # Errors
+    /// [`Error::Data`] if something is missing or is that of another algorithm. Nothing has changed then.
+    fn restore(&mut self, stored: &dyn StoredState) -> Result<(), Error>;
+
+    /// Takes over the [`models`](Self::models) of a finished run, to be tested, certified or looked into.
+    ///
+    /// # Errors
+    /// [`Error::Data`] if a tensor is missing or has another size. Nothing has changed then.
+    fn load(&mut self, stored: &dyn StoredState) -> Result<(), Error>;
+
+    /// V(s) of a state \[G\], if the algorithm judges states.
+    fn value(&mut self, state_g: &[f32]) -> Option<f32> {
+        let _ = state_g;
+        None
+    }
+}
+
+/// What an algorithm is built for.
+#[derive(Debug, Clone, Copy)]
+pub struct Team<'a> {
+    /// Sizes of the world.
+    pub spec: &'a EnvironmentSpec,
+    /// What every agent knows before the first step.
+    pub prior: &'a Arc<dyn PriorKnowledge>,
+    /// The run's seed, from which initial parameters follow.
+    pub seed: u64,
+    /// Threads that may be used, which changes no result.
+    pub threads: usize,
+}
 
 /// An algorithm that configurations can name, with the settings that it declares.
 pub trait AlgorithmKind: Send + Sync + Debug {
@@ -50,6 +135,12 @@ pub trait AlgorithmKind: Send + Sync + Debug {
         table: &toml::Table,
         spec: &EnvironmentSpec,
     ) -> Result<toml::Table, SettingsError>;
+
+    /// The algorithm that a complete table describes, for a team that has learnt nothing.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if the table is not one that [`check`](Self::check) accepts.
+    fn build(&self, table: &toml::Table, team: Team<'_>) -> Result<Box<dyn Algorithm>, Error>;
 
     /// Configurations that are shipped with it.
     fn presets(&self) -> &'static [Preset] {

@@ -19,8 +19,9 @@ use serde::{Deserialize, Serialize};
 use super::message::{Answer, Request, ViewMessage, fingerprints};
 use crate::{
     Error,
+    experience::{ATTEMPTS_MAX, Experience},
     policy::{
-        Behaviour, ControllerId, ControllerInput, Mode, Policy, Recording, Situation, Weights,
+        Behaviour, ControllerId, ControllerInput, Mode, Parameters, Policy, Recording, Situation,
     },
 };
 
@@ -77,8 +78,8 @@ pub struct CounterExample {
     pub step: usize,
     /// Whose action or input differs.
     pub agent: AgentId,
-    /// The pair whose controller read something else, if it was a pair's.
-    pub pair: Option<[AgentId; 2]>,
+    /// The controller that read something else, if one did.
+    pub controller: Option<ControllerId>,
     /// What the agent does in the central run.
     pub central_action: Action,
     /// What it does on its own, or in the altered world.
@@ -88,7 +89,7 @@ pub struct CounterExample {
 }
 
 /// One number that a controller reads differently.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DifferingInput {
     /// Whose input.
     pub controller: ControllerId,
@@ -108,16 +109,16 @@ pub struct DifferingInput {
 pub struct Subject<'a, 'l> {
     /// The policy as the central run uses it.
     pub policy: &'a dyn Policy,
-    /// Its weights.
-    pub weights: &'a Weights,
+    /// Its parameters.
+    pub parameters: &'a Parameters,
     /// A world to play in.
     pub environment: &'a mut dyn Environment,
     /// The agents, one link each.
     pub links: &'a mut [Box<dyn AgentLink + 'l>],
     /// Seed of the episodes.
     pub seed: u64,
-    /// ε while sampling, in [0, 1].
-    pub exploration: f64,
+    /// How choices are made in the first of the two modes: sampled.
+    pub sampled: Behaviour,
 }
 
 /// One episode of the central run: what there was to see, and what was done.
@@ -148,9 +149,8 @@ impl Subject<'_, '_> {
             episodes,
             ..Certificate::default()
         };
-        let sampled = Behaviour::sampled(self.exploration);
         let mut done = 0;
-        for behaviour in [sampled, Behaviour::GREEDY] {
+        for behaviour in [self.sampled, Behaviour::GREEDY] {
             for episode in 0..episodes as u64 {
                 let key = EpisodeKey::new(self.seed, Stream::Evaluation, episode);
                 let recorded = self.record(key, behaviour, &mut certificate)?;
@@ -169,10 +169,13 @@ impl Subject<'_, '_> {
         behaviour: Behaviour,
         certificate: &mut Certificate,
     ) -> Result<Recorded, Error> {
+        let mut attempts = 0;
         loop {
             let mut attempt = certificate.clone();
+            attempts += 1;
             match self.compare_separate_agents(key, behaviour, &mut attempt) {
-                Err(Error::Step(StepError::Interrupted(failure))) if failure.can_be_repeated => {}
+                Err(Error::Step(StepError::Interrupted(failure)))
+                    if failure.can_be_repeated && attempts < ATTEMPTS_MAX => {}
                 outcome => {
                     *certificate = attempt;
                     return outcome;
@@ -195,7 +198,8 @@ impl Subject<'_, '_> {
             observations_t: Vec::new(),
             actions_tn: Vec::new(),
         };
-        actor.begin(Recording::Off);
+        let mut experience = Experience::default();
+        actor.begin(Recording::Off, &mut experience);
         for link in &mut *self.links {
             link.ask(Request::Begin { key, behaviour })?;
         }
@@ -203,8 +207,8 @@ impl Subject<'_, '_> {
         for step in 0.. {
             let mut action_n = vec![Action::default(); spec.agents];
             let situation = situation(step, &key, &observations, behaviour);
-            actor.act(self.weights, situation, &mut action_n)?;
-            let central = actor.controller_inputs(0);
+            actor.act(self.parameters, situation, &mut experience, &mut action_n)?;
+            let central = actor.controller_inputs(&experience, 0);
             let place = Place {
                 mode: behaviour.mode,
                 key,
@@ -240,7 +244,8 @@ impl Subject<'_, '_> {
         let spec = self.environment.spec();
         for agent in (0..spec.agents).map(AgentId::new) {
             let mut actor = self.policy.actor(1);
-            actor.begin(Recording::Off);
+            let mut experience = Experience::default();
+            actor.begin(Recording::Off, &mut experience);
             let steps = recorded
                 .observations_t
                 .iter()
@@ -251,7 +256,7 @@ impl Subject<'_, '_> {
                 alter_unseen(&mut altered, spec, agent, &key, step);
                 let mut altered_n = vec![Action::default(); spec.agents];
                 let situation = situation(step, &key, &altered, behaviour);
-                actor.act(self.weights, situation, &mut altered_n)?;
+                actor.act(self.parameters, situation, &mut experience, &mut altered_n)?;
                 certificate.altered_actions_compared += 1;
                 let (central, found) = (action_n[agent.index()], altered_n[agent.index()]);
                 if central != found {
@@ -262,7 +267,7 @@ impl Subject<'_, '_> {
                         episode: key.episode,
                         step,
                         agent,
-                        pair: None,
+                        controller: None,
                         central_action: central,
                         agent_action: found,
                         differing_input: None,
@@ -314,14 +319,14 @@ fn compare_agent(
         };
         certificate.inputs_compared += 1;
         if central != fingerprint {
-            differing.get_or_insert(*controller);
+            differing.get_or_insert_with(|| controller.clone());
         }
     }
     certificate.actions_compared += 1;
     if action == central_action && differing.is_none() {
         return Ok(());
     }
-    let differing_input = match differing {
+    let differing_input = match &differing {
         Some(controller) => locate_difference(link, controller, central_inputs)?,
         None => None,
     };
@@ -331,10 +336,7 @@ fn compare_agent(
         episode: place.key.episode,
         step: place.step,
         agent,
-        pair: match differing {
-            Some(ControllerId::PairController(first, second)) => Some([first, second]),
-            _ => None,
-        },
+        controller: differing,
         central_action,
         agent_action: action,
         differing_input,
@@ -345,7 +347,7 @@ fn compare_agent(
 /// Finds the first input of `controller` that the agent reads differently.
 fn locate_difference(
     link: &mut dyn AgentLink,
-    controller: ControllerId,
+    controller: &ControllerId,
     central_inputs: &[ControllerInput],
 ) -> Result<Option<DifferingInput>, Error> {
     let Some(Answer::Inputs(own)) = link.ask(Request::Explain)? else {
@@ -354,7 +356,7 @@ fn locate_difference(
         ));
     };
     let values = |inputs: &[ControllerInput]| {
-        let input = inputs.iter().find(|input| input.controller == controller);
+        let input = inputs.iter().find(|input| input.controller == *controller);
         input.map(|input| input.values.clone()).unwrap_or_default()
     };
     let (central, agent) = (values(central_inputs), values(&own));
@@ -363,7 +365,7 @@ fn locate_difference(
         .zip(&agent)
         .position(|(a, b)| a.to_bits() != b.to_bits());
     Ok(differing.map(|index| DifferingInput {
-        controller,
+        controller: controller.clone(),
         index,
         central: central[index],
         agent: agent[index],

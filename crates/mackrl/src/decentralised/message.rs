@@ -8,10 +8,9 @@ use std::{
 use mackrl_env::{Action, AgentId, EntityId, EntitySet, EpisodeKey, KnownEntities, LocalView};
 use serde::{Deserialize, Serialize};
 
-use super::Executor;
 use crate::{
     Error,
-    policy::{Behaviour, ControllerId, ControllerInput, Weights},
+    policy::{Behaviour, ControllerId, ControllerInput, Executor, Parameters},
 };
 
 /// What an agent is told.
@@ -156,7 +155,7 @@ pub(super) fn fingerprints(inputs: &[ControllerInput]) -> Vec<(ControllerId, u64
             .values
             .iter()
             .for_each(|value| value.to_bits().hash(&mut hasher));
-        (input.controller, hasher.finish())
+        (input.controller.clone(), hasher.finish())
     };
     inputs.iter().map(fingerprint).collect()
 }
@@ -167,7 +166,7 @@ pub(super) fn fingerprints(inputs: &[ControllerInput]) -> Vec<(ControllerId, u64
 /// [`Error::Data`] if a line cannot be read, understood or answered.
 pub fn serve_agent(
     executor: &mut dyn Executor,
-    weights: &Weights,
+    parameters: &Parameters,
     requests: impl BufRead,
     mut answers: impl Write,
 ) -> Result<(), Error> {
@@ -176,7 +175,7 @@ pub fn serve_agent(
         let line = line.map_err(|error| Error::Data(format!("cannot read a request: {error}")))?;
         let request: Request = serde_json::from_str(&line)
             .map_err(|error| Error::Data(format!("cannot understand a request: {error}")))?;
-        let Some(answer) = answer(executor, weights, &mut episode, request)? else {
+        let Some(answer) = answer(executor, parameters, &mut episode, request)? else {
             continue;
         };
         serde_json::to_writer(&mut answers, &answer)
@@ -191,7 +190,7 @@ pub fn serve_agent(
 /// Acts on one request.
 pub(super) fn answer(
     executor: &mut dyn Executor,
-    weights: &Weights,
+    parameters: &Parameters,
     episode: &mut Option<(EpisodeKey, Behaviour)>,
     request: Request,
 ) -> Result<Option<Answer>, Error> {
@@ -208,7 +207,7 @@ pub(super) fn answer(
                 ));
             };
             let received = view.receive()?;
-            let action = executor.act(weights, received.view(), key, step, *behaviour);
+            let action = executor.act(parameters, received.view(), key, step, *behaviour);
             let fingerprints = fingerprints(&executor.controller_inputs());
             Ok(Some(Answer::Action {
                 action,

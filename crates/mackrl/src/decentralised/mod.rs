@@ -1,79 +1,37 @@
 //! Execution by one agent alone, and the certificate that it equals the central run.
 //!
-//! Training is central; what it yields must not be. An [`Executor`] is one agent with the weights, the shared seed and its own
+//! Training is central; what it yields must not be. An [`Executor`](crate::policy::Executor) is one agent with the weights, the shared seed and its own
 //! local views, and nothing else. [`Subject::certify`] plays whole episodes with N executors beside the central run and compares
 //! every action, and plays the central run again in worlds where everything that an agent does not see is different.
 
 mod certificate;
-mod executor;
 mod message;
 
-use mackrl_env::{Action, AgentId, EpisodeKey, LocalView};
+use mackrl_env::EpisodeKey;
 
-use self::executor::{AgentExecutor, PairwiseExecutor};
 pub use self::{
     certificate::{AgentLink, Certificate, Check, CounterExample, DifferingInput, Subject},
     message::{Answer, ReceivedView, Request, ViewMessage, serve_agent},
 };
 use crate::{
     Error,
-    baselines::CentralV,
-    hierarchy::PairwiseMackrl,
-    policy::{Behaviour, ControllerInput, Policy, Weights},
+    policy::{Behaviour, Executor, Parameters},
 };
-
-/// A policy that single agents can execute.
-pub trait Decentralised: Policy {
-    /// Working memory for `agent` alone.
-    fn executor(&self, agent: AgentId) -> Box<dyn Executor>;
-}
-
-/// Plays one agent from its own local views.
-pub trait Executor: Send {
-    /// Starts a new episode, with all hidden states zero.
-    fn begin(&mut self);
-
-    /// Chooses the agent's action at `step` of the episode `key`. Draws that concern a group are derived from the key by
-    /// each member alone.
-    fn act(
-        &mut self,
-        weights: &Weights,
-        view: LocalView<'_>,
-        key: &EpisodeKey,
-        step: usize,
-        behaviour: Behaviour,
-    ) -> Action;
-
-    /// What this agent's controllers read at the latest step.
-    fn controller_inputs(&self) -> Vec<ControllerInput>;
-}
-
-impl Decentralised for PairwiseMackrl {
-    fn executor(&self, agent: AgentId) -> Box<dyn Executor> {
-        Box::new(PairwiseExecutor::new(self.hierarchy.clone(), agent))
-    }
-}
-
-impl Decentralised for CentralV {
-    fn executor(&self, agent: AgentId) -> Box<dyn Executor> {
-        Box::new(AgentExecutor::new(self.agents.clone(), agent))
-    }
-}
 
 /// An agent in this process, reached through the same messages as one in another.
 pub struct InProcessAgent<'a> {
     executor: Box<dyn Executor>,
-    weights: &'a Weights,
+    parameters: &'a Parameters,
     episode: Option<(EpisodeKey, Behaviour)>,
 }
 
 impl<'a> InProcessAgent<'a> {
-    /// An agent that acts with `executor` and `weights`.
+    /// An agent that acts with `executor` and `parameters`.
     #[must_use]
-    pub fn new(executor: Box<dyn Executor>, weights: &'a Weights) -> Self {
+    pub fn new(executor: Box<dyn Executor>, parameters: &'a Parameters) -> Self {
         Self {
             executor,
-            weights,
+            parameters,
             episode: None,
         }
     }
@@ -83,7 +41,7 @@ impl AgentLink for InProcessAgent<'_> {
     fn ask(&mut self, request: Request) -> Result<Option<Answer>, Error> {
         message::answer(
             &mut *self.executor,
-            self.weights,
+            self.parameters,
             &mut self.episode,
             request,
         )

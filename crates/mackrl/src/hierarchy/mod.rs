@@ -1,194 +1,153 @@
-//! The controllers of pairwise MACKRL and the sampler that walks down them (Table 1, Algorithm 1, Figure 2).
+//! The controllers of a declared hierarchy at work (Table 1, Algorithm 1, Figure 2).
 //!
-//! | level | controller | reads | chooses |
-//! |---|---|---|---|
-//! | 1 | pair selector | common knowledge of the team | a partition into pairs |
-//! | 2 | pair controller | common knowledge of the pair, who they are | a joint action, or to delegate |
-//! | 3 | agent controller | its own observation and last action, who it is | its own action |
+//! | level of pairwise MACKRL | reads | chooses |
+//! |---|---|---|
+//! | pair selector | common knowledge of the team | a partition into pairs |
+//! | pair controller | common knowledge of the pair, who they are | a joint action, or to delegate |
+//! | agent controller | its own observation and last action, who it is | its own action |
 //!
-//! All three write their log-probabilities into one table, with masks and exploration applied. The sampler and the marginal
+//! All of them write their log-probabilities into one table, with masks and exploration applied. The walk and the marginal
 //! likelihood both read that table, so the probability that is differentiated is the one that was sampled from. The choice
 //! of partition or of delegation is never an input of a later step: p(u) marginalises over it, and a policy that depends on
 //! the path would make that marginal's gradient biased (Table 1 of the paper lists it; the authors' code has none either).
+//!
+//! A [`Hierarchy`] is any [`Declaration`] with its networks. [`Controllers`](controllers) run its levels from a
+//! [perspective], that of all agents or of one alone; [`evaluation`] gives log p(u) of an experience and turns a gradient with
+//! respect to it into one of the parameters.
 
+mod activations;
 mod actor;
-pub(crate) mod agent_controller;
-pub(crate) mod controller;
-pub(crate) mod pair_controller;
-pub(crate) mod pair_selector;
-mod sampling;
-pub(crate) mod statistics;
-pub(crate) mod thought;
+mod bank;
+mod controllers;
+mod evaluation;
+mod executor;
+mod perspective;
+mod statistics;
+mod tables;
+mod thought;
 
 use std::sync::Arc;
 
-use mackrl_env::{EnvironmentSpec, EpisodeKey, PriorKnowledge, Stream};
-use serde::{Deserialize, Serialize};
+use mackrl_env::{AgentId, EnvironmentSpec, EpisodeKey, PriorKnowledge, Stream};
 
-use self::{
-    actor::PairwiseActor, agent_controller::AgentController, pair_controller::PairController,
-    pair_selector::PairSelector,
-};
-pub use self::{
-    pair_controller::Delegation,
-    pair_selector::Selection,
-    sampling::{PairChoice, Path, Sampler},
-};
+pub use self::activations::Activations;
+use self::{actor::TeamActor, bank::Bank, executor::AgentExecutor};
 use crate::{
-    Error,
     common_knowledge::CommonKnowledgeFeatures,
-    nn::ParameterLayout,
-    partition::{Pair, PartitionSchedule, Partitions},
-    policy::{Actor, Policy, PolicyShape, Weights},
+    nn::{ParameterLayout, RecurrentWeights},
+    policy::{Actor, Declaration, Executor, Parameters, Policy},
 };
 
-/// What the hierarchy is made of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// What the controllers of a hierarchy are made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HierarchySettings {
     /// What controllers read of common knowledge.
     pub common_knowledge: CommonKnowledgeFeatures,
-    /// Which partitions there are.
-    pub partitions: PartitionSchedule,
-    /// How one of them is chosen.
-    pub selector: Selection,
-    /// When pairs may delegate.
-    pub delegation: Delegation,
     /// H: width of the hidden layers and of the recurrent state, at least 1.
     pub hidden: usize,
 }
 
-/// The policy of pairwise MACKRL.
+/// A declared hierarchy with its networks: the policy of a team.
 #[derive(Debug, Clone)]
-pub struct PairwiseMackrl {
-    pub(crate) hierarchy: Arc<Hierarchy>,
+pub struct Hierarchy {
+    parts: Arc<Parts>,
 }
 
-/// Everything about the hierarchy that does not change while it acts.
+/// Everything about a hierarchy that does not change while it acts.
 #[derive(Debug)]
-pub(crate) struct Hierarchy {
+pub(crate) struct Parts {
     pub(crate) spec: EnvironmentSpec,
-    pub(crate) shape: PolicyShape,
     pub(crate) prior: Arc<dyn PriorKnowledge>,
-    pub(crate) partitions: Partitions,
-    /// The pairs that some partition contains, ascending.
-    pub(crate) active_pairs: Vec<Pair>,
+    pub(crate) declaration: Declaration,
     pub(crate) layout: ParameterLayout,
-    /// Nothing where there is one partition, or all are equally likely.
-    pub(crate) selector: Option<PairSelector>,
-    pub(crate) pairs: PairController,
-    pub(crate) agents: AgentController,
+    /// Of each level; nothing where there is no choice, or all choices are equally likely.
+    pub(crate) banks: Vec<Option<Bank>>,
 }
 
-impl PairwiseMackrl {
-    /// The hierarchy for a world of the given sizes; sampled partitions are drawn from `seed`.
+/// The weights of all banks in the form that rows are computed with.
+pub(crate) type Weights = Vec<Option<RecurrentWeights<f32>>>;
+
+impl Hierarchy {
+    /// The hierarchy that `declaration` declares, for a world of the given sizes.
     ///
-    /// # Errors
-    /// [`Error::Config`] if the team is too large for the schedule of partitions.
+    /// # Panics
+    /// If the declaration is for another team.
+    #[must_use]
     pub fn new(
+        declaration: Declaration,
         spec: &EnvironmentSpec,
-        prior: Arc<dyn PriorKnowledge>,
-        settings: &HierarchySettings,
-        seed: u64,
-    ) -> Result<Self, Error> {
-        let partitions = settings.partitions.plan(spec.agents, seed)?;
+        prior: &Arc<dyn PriorKnowledge>,
+        settings: HierarchySettings,
+    ) -> Self {
+        assert_eq!(
+            [declaration.agents(), declaration.actions()],
+            [spec.agents, spec.actions],
+            "the declared team is that of the world"
+        );
         let mut layout = ParameterLayout::new();
-        let is_chosen = partitions.count() > 1 && settings.selector == Selection::Learned;
-        let selector = is_chosen.then(|| {
-            PairSelector::new(
-                &mut layout,
-                spec,
-                Arc::clone(&prior),
-                settings,
-                partitions.count(),
-            )
+        let features = settings.common_knowledge;
+        let banks = declaration.levels().iter().map(|level| {
+            let bank = || Bank::new(&mut layout, level, spec, prior, features, settings.hidden);
+            level.is_learned().then(bank)
         });
-        let pairs = PairController::new(&mut layout, spec, Arc::clone(&prior), settings);
-        let agents = AgentController::new(&mut layout, spec, settings.hidden);
-        let hierarchy = Hierarchy {
-            spec: spec.clone(),
-            shape: PolicyShape {
-                agents: spec.agents,
-                actions: spec.actions,
-            },
-            prior,
-            active_pairs: partitions.possible_pairs(),
-            partitions,
-            layout,
-            selector,
-            pairs,
-            agents,
-        };
-        Ok(Self {
-            hierarchy: Arc::new(hierarchy),
-        })
+        let banks = banks.collect();
+        Self {
+            parts: Arc::new(Parts {
+                spec: spec.clone(),
+                prior: Arc::clone(prior),
+                declaration,
+                layout,
+                banks,
+            }),
+        }
+    }
+
+    /// Its levels of groups.
+    #[must_use]
+    pub fn declaration(&self) -> &Declaration {
+        &self.parts.declaration
     }
 }
 
-impl Policy for PairwiseMackrl {
+impl Parts {
+    /// The weights under `parameters`, packed once for each version of them.
+    pub(crate) fn weights<'a>(&self, parameters: &'a Parameters) -> &'a Weights {
+        parameters.prepared(|values| {
+            let banks = self.banks.iter();
+            let weights = banks.map(|bank| bank.as_ref().map(|bank| bank.network.weights(values)));
+            weights.collect::<Weights>()
+        })
+    }
+
+    /// ε of a level's choices, if exploration is `exploration`. The paper explores at the second and the third level only.
+    pub(crate) fn epsilon(&self, level: usize, exploration: f32) -> f32 {
+        if self.declaration.levels()[level].explores {
+            exploration
+        } else {
+            0.0
+        }
+    }
+}
+
+impl Policy for Hierarchy {
     fn layout(&self) -> &ParameterLayout {
-        &self.hierarchy.layout
+        &self.parts.layout
     }
 
     fn initialise(&self, seed: u64) -> Vec<f32> {
-        let Hierarchy {
-            layout,
-            selector,
-            pairs,
-            agents,
-            ..
-        } = &*self.hierarchy;
-        let key = initialisation_key(seed);
-        let mut parameters = vec![0.0; layout.len()];
-        let upper = selector
-            .iter()
-            .map(PairSelector::controller)
-            .chain([pairs.controller()]);
-        for controller in upper.chain([agents.controller()]) {
-            controller.initialise(&key, &mut parameters);
+        let key = EpisodeKey::new(seed, Stream::Other, 0);
+        let mut parameters = vec![0.0; self.parts.layout.len()];
+        for bank in self.parts.banks.iter().flatten() {
+            bank.network.initialise(&key, &mut parameters);
         }
         parameters
     }
 
-    fn weights(&self, parameters: &[f32]) -> Weights {
-        let Hierarchy {
-            selector,
-            pairs,
-            agents,
-            ..
-        } = &*self.hierarchy;
-        let selector = selector.as_ref().map(PairSelector::controller);
-        Weights {
-            selector: selector.map(|controller| controller.weights(parameters)),
-            pairs: Some(pairs.controller().weights(parameters)),
-            agents: agents.controller().weights(parameters),
-        }
-    }
-
-    fn refresh(&self, parameters: &[f32], weights: &mut Weights) {
-        let Hierarchy {
-            selector,
-            pairs,
-            agents,
-            ..
-        } = &*self.hierarchy;
-        if let (Some(selector), Some(weights)) = (selector, &mut weights.selector) {
-            selector.controller().refresh(parameters, weights);
-        }
-        if let Some(weights) = &mut weights.pairs {
-            pairs.controller().refresh(parameters, weights);
-        }
-        agents.controller().refresh(parameters, &mut weights.agents);
-    }
-
     fn actor(&self, environments: usize) -> Box<dyn Actor> {
-        Box::new(PairwiseActor::new(
-            Arc::clone(&self.hierarchy),
-            environments,
-        ))
+        Box::new(TeamActor::new(Arc::clone(&self.parts), environments))
     }
-}
 
-/// Names the draws of a policy's initial parameters.
-pub(crate) const fn initialisation_key(seed: u64) -> EpisodeKey {
-    EpisodeKey::new(seed, Stream::Other, 0)
+    fn executor(&self, agent: AgentId) -> Box<dyn Executor> {
+        Box::new(AgentExecutor::new(Arc::clone(&self.parts), agent))
+    }
 }

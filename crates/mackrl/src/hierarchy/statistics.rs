@@ -2,25 +2,25 @@
 
 use mackrl_env::EntitySet;
 
-use super::Path;
+use super::{Parts, tables::Decision};
 use crate::{
     Real,
-    policy::{PolicyTable, Tally},
+    policy::{Part, Tally},
 };
 
 /// Sums over the steps of the latest episodes.
 #[derive(Debug, Clone)]
 pub(crate) struct HierarchyStatistics {
-    enemies: usize,
-    /// Chosen pairs of living agents with common knowledge, by the number of commonly known enemies: how many delegated,
-    /// and how many there were. Figure 7 plots their ratio.
+    /// Chosen groups of living agents that could act jointly, by the number of commonly known enemies: how many divided
+    /// instead, and how many there were. Figure 7 plots their ratio.
     delegated_by_enemies: Vec<Count>,
-    /// Chosen pairs without common knowledge, which can only delegate.
+    /// Chosen groups without common knowledge, which can only divide.
     without_common_knowledge: Count,
     known_entities: Count,
-    selector_entropy: Count,
-    pair_entropy: Count,
-    agent_entropy: Count,
+    /// Of each level with a network: its name in metrics, and the entropy of its choices.
+    entropies: Vec<(Option<String>, Count)>,
+    /// Whether some level may act jointly or delegate.
+    delegates: bool,
 }
 
 /// A sum and the number of its terms.
@@ -35,68 +35,102 @@ impl Count {
         self.sum += term;
         self.terms += 1.0;
     }
+
+    const fn plus(self, other: Self) -> Self {
+        Self {
+            sum: self.sum + other.sum,
+            terms: self.terms + other.terms,
+        }
+    }
 }
 
 impl HierarchyStatistics {
-    pub(crate) fn new(enemies: usize) -> Self {
+    pub(crate) fn new(parts: &Parts) -> Self {
+        let enemies = parts.spec.entities - parts.spec.agents;
+        let levels = parts.declaration.levels();
+        let named = levels.iter().map(|level| {
+            let name = level
+                .is_learned()
+                .then(|| format!("mackrl/entropy_{}", level.name));
+            (name, Count::default())
+        });
         Self {
-            enemies,
             delegated_by_enemies: vec![Count::default(); enemies + 1],
             without_common_knowledge: Count::default(),
             known_entities: Count::default(),
-            selector_entropy: Count::default(),
-            pair_entropy: Count::default(),
-            agent_entropy: Count::default(),
+            entropies: named.collect(),
+            delegates: levels
+                .iter()
+                .any(|level| level.acts.is_some() && level.divisions > 0),
         }
     }
 
     pub(crate) fn clear(&mut self) {
-        *self = Self::new(self.enemies);
+        self.delegated_by_enemies.fill(Count::default());
+        self.without_common_knowledge = Count::default();
+        self.known_entities = Count::default();
+        self.entropies
+            .iter_mut()
+            .for_each(|(_, count)| *count = Count::default());
     }
 
-    /// Notes one step of one environment. `alive_n` \[N\]; `known_k` \[K\] is the common knowledge of every pair.
-    pub(crate) fn observe(
-        &mut self,
-        table: &PolicyTable<'_, f32>,
-        path: &Path,
-        known_k: &[EntitySet],
-        alive_n: &[bool],
-    ) {
-        let agents = EntitySet::first(alive_n.len());
-        self.selector_entropy.add(entropy(table.selector()));
-        let partition = &table.partitions()[path.partition];
-        for (place, pair) in partition.pairs().iter().enumerate() {
-            if !pair
-                .agents()
-                .into_iter()
-                .all(|agent| alive_n[agent.index()])
-            {
+    /// Notes one step of one environment.
+    pub(crate) fn observe(&mut self, decision: &Decision<'_>) {
+        let declaration = decision.table.declaration();
+        let agents = EntitySet::first(declaration.agents());
+        let alone = declaration.alone();
+        for &(part, column) in &decision.path.choices {
+            let level = &declaration.levels()[part.level];
+            if part.level == alone || level.is_forced_by_death() && !decision.lives(part) {
                 continue;
             }
-            let known = known_k[pair.index()];
-            let delegated = f64::from(u8::from(path.delegated[place]));
-            self.known_entities.add(known.len() as f64);
-            if known.is_empty() {
-                self.without_common_knowledge.add(delegated);
-            } else {
-                self.delegated_by_enemies[known.difference(agents).len()].add(delegated);
-                self.pair_entropy.add(entropy(table.pair(pair.index())));
+            let mut chooses = true;
+            if level.acts.is_some() {
+                let known = decision.known(part);
+                let delegated = f64::from(u8::from(column < level.divisions));
+                self.known_entities.add(known.len() as f64);
+                if known.is_empty() {
+                    self.without_common_knowledge.add(delegated);
+                    chooses = false;
+                } else {
+                    self.delegated_by_enemies[known.difference(agents).len()].add(delegated);
+                }
+            }
+            if chooses {
+                self.note_entropy(decision, part);
             }
         }
-        let living = (0..alive_n.len()).filter(|&agent| alive_n[agent]);
-        living.for_each(|agent| self.agent_entropy.add(entropy(table.agent(agent))));
+        for group in 0..declaration.agents() {
+            let agent = Part {
+                level: alone,
+                group,
+            };
+            if decision.lives(agent) {
+                self.note_entropy(decision, agent);
+            }
+        }
     }
 
-    /// Adds the sums to `tally` under the names that `training::metrics` explains.
+    fn note_entropy(&mut self, decision: &Decision<'_>, part: Part) {
+        let (name, count) = &mut self.entropies[part.level];
+        if name.is_some() {
+            count.add(entropy(decision.table.row(part)));
+        }
+    }
+
+    /// Adds the sums to `tally`.
     pub(crate) fn report(&self, tally: &mut Tally) {
         let mut add = |name: &str, count: Count| tally.add(name, count.sum, count.terms);
-        let with_knowledge =
-            self.delegated_by_enemies
-                .iter()
-                .fold(Count::default(), |all, some| Count {
-                    sum: all.sum + some.sum,
-                    terms: all.terms + some.terms,
-                });
+        for (name, count) in &self.entropies {
+            if let Some(name) = name {
+                add(name, *count);
+            }
+        }
+        if !self.delegates {
+            return;
+        }
+        let by_enemies = self.delegated_by_enemies.iter().copied();
+        let with_knowledge = by_enemies.fold(Count::default(), Count::plus);
         add("mackrl/delegation_rate", with_knowledge);
         for (enemies, &count) in self.delegated_by_enemies.iter().enumerate() {
             add(
@@ -104,18 +138,12 @@ impl HierarchyStatistics {
                 count,
             );
         }
-        let all_pairs = with_knowledge.terms + self.without_common_knowledge.terms;
-        add(
-            "mackrl/common_knowledge_rate",
-            Count {
-                sum: with_knowledge.terms,
-                terms: all_pairs,
-            },
-        );
+        let known = Count {
+            sum: with_knowledge.terms,
+            terms: with_knowledge.terms + self.without_common_knowledge.terms,
+        };
+        add("mackrl/common_knowledge_rate", known);
         add("mackrl/ck_entities_mean", self.known_entities);
-        add("mackrl/entropy_l1", self.selector_entropy);
-        add("mackrl/entropy_l2", self.pair_entropy);
-        add("mackrl/entropy_l3", self.agent_entropy);
     }
 }
 

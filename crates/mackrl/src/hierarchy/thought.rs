@@ -1,130 +1,143 @@
 //! From the tables of one step to what a person wants to see of them.
 
-use mackrl_env::{Action, AgentId, EntitySet};
+use mackrl_env::{Action, AgentId};
 
-use super::Path;
+use super::tables::Decision;
 use crate::{
-    marginalisation::MarginalGradient,
-    partition::{Pair, Partition},
+    Real,
+    marginalisation::{MarginalGradient, log_likelihood_with_gradient},
     policy::{
-        AgentThought, Choice, DELEGATE, JointOption, PairThought, PartitionThought, PolicyTable,
-        Thought, most_probable,
+        AgentThought, Division, GroupChoice, GroupThought, JointOption, PairThought, Part,
+        PartitionThought, TEAM, Thought, most_probable,
     },
 };
 
-/// One step of one environment, decided.
-#[derive(Debug)]
-pub(super) struct Subject<'a> {
-    pub(super) table: PolicyTable<'a, f32>,
-    pub(super) path: &'a Path,
-    /// Common knowledge of every pair \[K\].
-    pub(super) known_k: &'a [EntitySet],
-    pub(super) alive_n: &'a [bool],
-    pub(super) action_n: &'a [Action],
-}
-
-/// Describes a decided step; `marginal` is log p(u) with its gradient, whose entries are posteriors.
+/// Describes a decided step that led to `action_n`; `posterior` is room for the gradient of log p(u), whose entries are
+/// posteriors.
 pub(super) fn describe(
-    subject: &Subject<'_>,
-    pairs: &[Pair],
-    (log_p, posterior): (f32, &MarginalGradient<f32>),
+    decision: &Decision<'_>,
+    action_n: &[Action],
+    posterior: &mut MarginalGradient<f32>,
 ) -> Thought {
-    let table = &subject.table;
-    let partitions = table.partitions().iter().zip(table.selector());
-    let living = pairs.iter().filter(|pair| subject.lives(**pair));
-    let agents = (0..subject.alive_n.len()).filter(|&agent| subject.alive_n[agent]);
-    Thought {
-        partitions: partitions
-            .zip(&posterior.selector_p)
-            .map(|((partition, log_p), posterior)| PartitionThought {
-                groups: groups(partition),
-                probability: log_p.exp(),
-                posterior: *posterior,
-            })
-            .collect(),
-        chosen: Some(subject.path.partition),
-        pairs: living.map(|pair| subject.pair(*pair, posterior)).collect(),
-        agents: agents
-            .map(|n| AgentThought::new(AgentId::new(n), table.agent(n), subject.action_n[n]))
-            .collect(),
-        log_p_path: subject.log_p_path(),
+    let table = &decision.table;
+    let declaration = table.declaration();
+    let log_p = log_likelihood_with_gradient(table, action_n, posterior);
+    let team = Part {
+        level: TEAM,
+        group: 0,
+    };
+    let mut thought = Thought {
+        log_p_path: decision
+            .path
+            .choices
+            .iter()
+            .map(|&(part, column)| f64::from(table.row(part)[column]))
+            .sum(),
         log_p: f64::from(log_p),
+        ..Thought::default()
+    };
+    // A team of agents that act alone divides in one way, which says nothing.
+    if declaration.levels().len() > 2 {
+        thought.partitions = divisions(decision, team, posterior);
+        thought.chosen = decision.path.choice(team);
     }
-}
-
-impl Subject<'_> {
-    fn lives(&self, pair: Pair) -> bool {
-        let mut members = pair.agents().into_iter();
-        members.all(|agent| self.alive_n[agent.index()])
-    }
-
-    fn chosen(&self) -> &Partition {
-        &self.table.partitions()[self.path.partition]
-    }
-
-    /// What `pair` chose, if the chosen partition contains it.
-    fn choice(&self, pair: Pair) -> Option<Choice> {
-        let place = self.chosen().pairs().iter().position(|own| *own == pair)?;
-        Some(if self.path.delegated[place] {
-            Choice::Delegate
-        } else {
-            Choice::Joint
-        })
-    }
-
-    fn column(&self, pair: Pair) -> usize {
-        let [first, second] = pair.agents().map(|agent| self.action_n[agent.index()]);
-        self.table.shape().column(first, second)
-    }
-
-    fn pair(&self, pair: Pair, posterior: &MarginalGradient<f32>) -> PairThought {
-        let log_p_c = self.table.pair(pair.index());
-        let shape = self.table.shape();
-        let joint = most_probable(&log_p_c[DELEGATE + 1..], self.column(pair) - 1);
-        PairThought {
-            members: pair.agents(),
-            known: self.known_k[pair.index()].iter().collect(),
-            delegate: log_p_c[DELEGATE].exp(),
-            joint: joint
-                .into_iter()
-                .filter_map(|(index, probability)| {
-                    let actions = shape.joint_action(index + 1)?;
-                    Some(JointOption {
-                        actions,
-                        probability,
-                    })
-                })
-                .collect(),
-            choice: self.choice(pair),
-            posterior_joint: posterior.joint_k[pair.index()],
-            posterior_delegate: posterior.delegate_k[pair.index()],
+    for (place, level) in declaration.levels().iter().enumerate().skip(1) {
+        for &group in &level.active {
+            let part = Part {
+                level: place,
+                group,
+            };
+            if !decision.possible_g[place][group]
+                || level.is_forced_by_death() && !decision.lives(part)
+            {
+                continue;
+            }
+            match (level.size(), &declaration.members(part)[..]) {
+                (1, &[agent]) => {
+                    let taken = action_n[agent.index()];
+                    thought
+                        .agents
+                        .push(AgentThought::new(agent, table.row(part), taken));
+                }
+                (2, &[a, b]) => {
+                    thought
+                        .pairs
+                        .push(pair(decision, part, [a, b], action_n, posterior))
+                }
+                (_, members) => thought.groups.push(GroupThought {
+                    members: members.to_vec(),
+                    known: decision.known(part).iter().collect(),
+                    divisions: divisions(decision, part, posterior),
+                    chosen: decision.path.choice(part),
+                }),
+            }
         }
     }
-
-    /// The sum of the logarithms of all choices on the way.
-    fn log_p_path(&self) -> f64 {
-        let alone = |agent: AgentId| {
-            let action = self.action_n[agent.index()];
-            f64::from(self.table.agent(agent.index())[action.index()])
-        };
-        let pairs = self.chosen().pairs().iter().map(|pair| {
-            let log_p_c = self.table.pair(pair.index());
-            match self.choice(*pair) {
-                Some(Choice::Delegate) => {
-                    f64::from(log_p_c[DELEGATE]) + pair.agents().map(alone).iter().sum::<f64>()
-                }
-                _ => f64::from(log_p_c[self.column(*pair)]),
-            }
-        });
-        f64::from(self.table.selector()[self.path.partition])
-            + pairs.sum::<f64>()
-            + self.chosen().singleton().map_or(0.0, alone)
-    }
+    thought
 }
 
-fn groups(partition: &Partition) -> Vec<Vec<AgentId>> {
-    let pairs = partition.pairs().iter().map(|pair| pair.agents().to_vec());
-    pairs
-        .chain(partition.singleton().map(|agent| vec![agent]))
+/// The ways in which a group may divide.
+fn divisions(
+    decision: &Decision<'_>,
+    part: Part,
+    posterior: &MarginalGradient<f32>,
+) -> Vec<PartitionThought> {
+    let declaration = decision.table.declaration();
+    let groups = |division: &Division| {
+        let parts = division.parts.iter();
+        parts
+            .map(|part| declaration.members(*part).to_vec())
+            .collect()
+    };
+    let choices = decision
+        .table
+        .divisions(part)
+        .iter()
+        .zip(decision.table.row(part));
+    choices
+        .zip(posterior.divisions(part))
+        .map(|((division, &log_p), &posterior)| PartitionThought {
+            groups: groups(division),
+            probability: Real::exp(log_p),
+            posterior,
+        })
         .collect()
+}
+
+fn pair(
+    decision: &Decision<'_>,
+    part: Part,
+    members: [AgentId; 2],
+    action_n: &[Action],
+    posterior: &MarginalGradient<f32>,
+) -> PairThought {
+    let declaration = decision.table.declaration();
+    let (level, actions) = (&declaration.levels()[part.level], declaration.actions());
+    let log_p_c = decision.table.row(part);
+    let (divide, joint) = log_p_c.split_at(level.divisions);
+    let column = level
+        .column(part.group, actions, action_n)
+        .expect("pairs act jointly");
+    let choice = decision.path.choice(part).map(|column| {
+        if column < level.divisions {
+            GroupChoice::Delegate
+        } else {
+            GroupChoice::Joint
+        }
+    });
+    let options = most_probable(joint, column - level.divisions).into_iter();
+    PairThought {
+        members,
+        known: decision.known(part).iter().collect(),
+        delegate: divide.iter().map(|&log_p| Real::exp(log_p)).sum(),
+        joint: options
+            .map(|(joint, probability)| JointOption {
+                actions: [joint / actions, joint % actions].map(Action::new),
+                probability,
+            })
+            .collect(),
+        choice,
+        posterior_joint: posterior.joint(part),
+        posterior_delegate: posterior.divisions(part).iter().sum(),
+    }
 }

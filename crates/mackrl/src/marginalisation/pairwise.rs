@@ -4,33 +4,24 @@
 //! pairs, a sum over partitions. A product of many probabilities leaves the range of `f32` (24 agents that choose evenly
 //! among 36 actions: e⁻⁸⁶, at its very edge; a sharper policy: far below), so everything stays in logarithms.
 
-use mackrl_env::{Action, AgentId};
+use mackrl_env::Action;
 
+use super::{
+    MarginalGradient,
+    logarithm::{log_sum_exp, share},
+};
 use crate::{
     Real,
-    partition::{Pair, Partition},
-    policy::{DELEGATE, PolicyShape, PolicyTable},
+    policy::{Division, Part, PolicyTable, TEAM},
 };
 
-/// d log p(u) / d log π for every table entry that the joint action u touches; all other entries have none.
-///
-/// Every number is a posterior probability given u, in [0, 1]. If p(u) = 0 there is no gradient, and all are 0.
-#[derive(Debug, Clone, PartialEq)]
-pub struct MarginalGradient<F> {
-    /// For each partition \[P\]: that it was chosen. Sums to 1.
-    pub selector_p: Vec<F>,
-    /// For each pair \[K\]: that it was formed and acted jointly. Belongs to the column of `(u_a, u_b)`.
-    pub joint_k: Vec<F>,
-    /// For each pair \[K\]: that it was formed and delegated. Belongs to the column [`DELEGATE`].
-    pub delegate_k: Vec<F>,
-    /// For each agent \[N\]: that it acted alone. Belongs to the column `u_a`.
-    pub agent_n: Vec<F>,
-    /// Factors of the pairs in force \[K\], and whether they have been computed.
-    factor_k: Vec<Option<PairFactor<F>>>,
-}
+/// The column of a pair's row that stands for *delegate*; the joint actions follow.
+pub const DELEGATE: usize = 0;
+/// The levels of pairs and of agents.
+const PAIRS: usize = 1;
+const AGENTS: usize = 2;
 
 /// One pair's factor of p(u | partition): the joint way plus the delegated way.
-#[derive(Debug, Clone, Copy, PartialEq)]
 struct PairFactor<F> {
     /// `log π_pc(u_a, u_b)`
     joint: F,
@@ -40,80 +31,20 @@ struct PairFactor<F> {
     log_p: F,
 }
 
-impl<F: Real> MarginalGradient<F> {
-    /// Room for `partitions` partitions in force.
-    #[must_use]
-    pub fn new(shape: PolicyShape, partitions: usize) -> Self {
-        let zeros = |count| vec![F::ZERO; count];
-        Self {
-            selector_p: zeros(partitions),
-            joint_k: zeros(shape.pairs()),
-            delegate_k: zeros(shape.pairs()),
-            agent_n: zeros(shape.agents),
-            factor_k: vec![None; shape.pairs()],
-        }
-    }
-
-    /// Forgets everything and takes the sizes of `table`; allocates only to grow.
-    fn reset(&mut self, table: &PolicyTable<'_, F>) {
-        let zero = |weights: &mut Vec<F>, count| {
-            weights.clear();
-            weights.resize(count, F::ZERO);
-        };
-        let shape = table.shape();
-        zero(&mut self.selector_p, table.partitions().len());
-        zero(&mut self.joint_k, shape.pairs());
-        zero(&mut self.delegate_k, shape.pairs());
-        zero(&mut self.agent_n, shape.agents);
-        self.factor_k.clear();
-        self.factor_k.resize(shape.pairs(), None);
-    }
-}
-
-/// log p(u), the log-probability that the hierarchy of `table` ends in the joint action `actions_n`.
-///
-/// −∞ if no path leads there.
+/// log p(u) and its gradient for [`Declaration::pairwise`](crate::policy::Declaration::pairwise).
 ///
 /// # Shapes
-/// `actions_n` \[N\].
+/// `action_n` \[N\].
 ///
 /// # Equation
-/// Eq. (5) for the pairwise hierarchy:
+/// Eq. (5) for the pairwise hierarchy, with `w_P` the posterior of partition P, `r_k` that of pair k and `δ_k` the share of
+/// delegation in the pair's factor:
 ///
 /// ```text
 /// log p(u) = LSE_P [ log π_ps(P)
 ///                  + Σ_{ {a,b} ∈ P } LSE( log π_pc(u_a, u_b), log π_pc(d) + log π_a(u_a) + log π_b(u_b) )
 ///                  + Σ_{singleton c of P} log π_c(u_c) ]
-/// ```
-#[must_use]
-pub fn log_likelihood<F: Real>(table: &PolicyTable<'_, F>, actions_n: &[Action]) -> F {
-    debug_assert_eq!(
-        actions_n.len(),
-        table.shape().agents,
-        "one action per agent"
-    );
-    let terms = table
-        .partitions()
-        .iter()
-        .zip(table.selector())
-        .map(|(partition, &log_p)| {
-            let factor = |pair: &Pair| pair_factor(table, *pair, actions_n).log_p;
-            log_p + log_p_given(table, partition, actions_n, factor)
-        });
-    log_sum_exp(terms)
-}
-
-/// [`log_likelihood`], and its derivative with respect to every entry of the table, written to `gradient`.
 ///
-/// Allocates nothing once `gradient` has had the table's sizes.
-///
-/// # Shapes
-/// `actions_n` \[N\].
-///
-/// # Equation
-/// With `w_P` the posterior of partition P, `r_k` that of pair k and `δ_k` the share of delegation in the pair's factor:
-///
-/// ```text
 /// w_P = π_ps(P)·p(u | P) / p(u)                    ∂ log p(u) / ∂ log π_ps(P)         = w_P
 /// r_k = Σ_{P ∋ k} w_P                              ∂ log p(u) / ∂ log π_pc(u_a, u_b)  = r_k·(1 − δ_k)
 /// δ_k = π_pc(d)·π_a(u_a)·π_b(u_b) / p(u_a, u_b)    ∂ log p(u) / ∂ log π_pc(d)         = r_k·δ_k
@@ -121,163 +52,119 @@ pub fn log_likelihood<F: Real>(table: &PolicyTable<'_, F>, actions_n: &[Action])
 /// ```
 pub fn log_likelihood_with_gradient<F: Real>(
     table: &PolicyTable<'_, F>,
-    actions_n: &[Action],
+    action_n: &[Action],
     gradient: &mut MarginalGradient<F>,
 ) -> F {
     debug_assert_eq!(
-        actions_n.len(),
-        table.shape().agents,
+        action_n.len(),
+        table.declaration().agents(),
         "one action per agent"
     );
     gradient.reset(table);
-    let MarginalGradient {
-        selector_p,
-        factor_k,
-        ..
-    } = gradient;
-    for ((term, partition), &log_p) in selector_p
+    let [team, pairs, _] = &mut gradient.levels[..] else {
+        unreachable!("the pairwise hierarchy has three levels");
+    };
+    let selector = table.row(Part {
+        level: TEAM,
+        group: 0,
+    });
+    for ((term, division), &log_p) in team
+        .division_gd
         .iter_mut()
-        .zip(table.partitions())
-        .zip(table.selector())
+        .zip(table.in_force())
+        .zip(selector)
     {
-        let factor = |pair: &Pair| {
-            factor_k[pair.index()]
-                .get_or_insert_with(|| pair_factor(table, *pair, actions_n))
-                .log_p
+        let factor = |pair: Part| {
+            let known = &mut pairs.log_p_g[pair.group];
+            *known.get_or_insert_with(|| pair_factor(table, pair, action_n).log_p)
         };
-        *term = log_p + log_p_given(table, partition, actions_n, factor);
+        *term = log_p + log_p_given(table, division, action_n, factor);
     }
-    let log_p = log_sum_exp(selector_p.iter().copied());
-    for term in selector_p {
+    let log_p = log_sum_exp(team.division_gd.iter().copied());
+    for term in &mut team.division_gd {
         *term = share(*term, log_p);
     }
-    distribute(table, gradient);
+    distribute(table, action_n, gradient);
     log_p
 }
 
-/// Passes the posteriors of the partitions, in `selector_p`, down to pairs and agents.
-fn distribute<F: Real>(table: &PolicyTable<'_, F>, gradient: &mut MarginalGradient<F>) {
-    // `joint_k` collects the posteriors of the pairs before they are split.
-    for (partition, &posterior) in table.partitions().iter().zip(&gradient.selector_p) {
-        for pair in partition.pairs() {
-            gradient.joint_k[pair.index()] += posterior;
-        }
-        if let Some(agent) = partition.singleton() {
-            gradient.agent_n[agent.index()] += posterior;
+/// Passes the posteriors of the partitions down to pairs and agents.
+fn distribute<F: Real>(
+    table: &PolicyTable<'_, F>,
+    action_n: &[Action],
+    gradient: &mut MarginalGradient<F>,
+) {
+    let [team, pairs, agents] = &mut gradient.levels[..] else {
+        unreachable!("the pairwise hierarchy has three levels");
+    };
+    // The joint way's place collects the posteriors of the pairs before they are split.
+    for (division, &posterior) in table.in_force().iter().zip(&team.division_gd) {
+        for part in &division.parts {
+            let level = if part.level == PAIRS {
+                &mut *pairs
+            } else {
+                &mut *agents
+            };
+            level.joint_g[part.group] += posterior;
         }
     }
-    for partition in table.partitions() {
-        for pair in partition.pairs() {
-            let k = pair.index();
+    for division in table.in_force() {
+        for &pair in division.parts.iter().filter(|part| part.level == PAIRS) {
+            let k = pair.group;
             // Taken, so that a pair of several partitions is split once.
-            let Some(factor) = gradient.factor_k[k].take() else {
+            if pairs.log_p_g[k].take().is_none() {
                 continue;
-            };
-            let posterior = gradient.joint_k[k];
-            gradient.joint_k[k] = posterior * share(factor.joint, factor.log_p);
-            gradient.delegate_k[k] = posterior * share(factor.delegated, factor.log_p);
-            for agent in pair.agents() {
-                gradient.agent_n[agent.index()] += gradient.delegate_k[k];
+            }
+            let factor = pair_factor(table, pair, action_n);
+            let posterior = pairs.joint_g[k];
+            pairs.joint_g[k] = posterior * share(factor.joint, factor.log_p);
+            pairs.division_gd[k] = posterior * share(factor.delegated, factor.log_p);
+            for agent in table.declaration().members(pair) {
+                agents.joint_g[agent.index()] += pairs.division_gd[k];
             }
         }
     }
 }
 
-/// log p(u | `partition`), given each pair's log factor.
+/// log p(u | `division`), given each pair's log factor: the pairs come first, an agent that is alone last.
 fn log_p_given<F: Real>(
     table: &PolicyTable<'_, F>,
-    partition: &Partition,
-    actions_n: &[Action],
-    log_factor: impl FnMut(&Pair) -> F,
+    division: &Division,
+    action_n: &[Action],
+    mut log_factor: impl FnMut(Part) -> F,
 ) -> F {
-    let alone = partition.singleton().map_or(F::ZERO, |agent| {
-        table.agent(agent.index())[actions_n[agent.index()].index()]
+    let terms = division.parts.iter().map(|&part| {
+        if part.level == PAIRS {
+            log_factor(part)
+        } else {
+            table.row(part)[action_n[part.group].index()]
+        }
     });
-    partition.pairs().iter().map(log_factor).sum::<F>() + alone
+    terms.sum()
 }
 
 fn pair_factor<F: Real>(
     table: &PolicyTable<'_, F>,
-    pair: Pair,
-    actions_n: &[Action],
+    pair: Part,
+    action_n: &[Action],
 ) -> PairFactor<F> {
-    let [a, b] = pair.agents().map(AgentId::index);
-    let log_p_c = table.pair(pair.index());
-    let joint = log_p_c[table.shape().column(actions_n[a], actions_n[b])];
-    let delegated = log_p_c[DELEGATE]
-        + table.agent(a)[actions_n[a].index()]
-        + table.agent(b)[actions_n[b].index()];
+    let declaration = table.declaration();
+    let log_p_c = table.row(pair);
+    let level = &declaration.levels()[PAIRS];
+    let column = level.column(pair.group, declaration.actions(), action_n);
+    let joint = log_p_c[column.expect("pairs act jointly")];
+    let alone = |agent: &mackrl_env::AgentId| {
+        let row = table.row(Part {
+            level: AGENTS,
+            group: agent.index(),
+        });
+        row[action_n[agent.index()].index()]
+    };
+    let members = declaration.members(pair).iter().map(alone);
+    let delegated = members.fold(log_p_c[DELEGATE], |sum, log_p| sum + log_p);
     PairFactor {
         joint,
         delegated,
         log_p: log_sum_exp([joint, delegated]),
-    }
-}
-
-/// e^{term − total}: the share of a term in a sum, both in logarithms; 0 if the sum is empty of probability.
-fn share<F: Real>(term: F, total: F) -> F {
-    if term == F::NEG_INFINITY {
-        F::ZERO
-    } else {
-        (term - total).exp()
-    }
-}
-
-/// log Σ e^{x} in one pass, −∞ if there is no probability. If one term alone is not −∞, it is returned to the bit; a NaN
-/// stays one, so that whoever checks the result finds it.
-fn log_sum_exp<F: Real>(terms: impl IntoIterator<Item = F>) -> F {
-    let mut largest = F::NEG_INFINITY;
-    // Σ e^{x − largest} over the terms so far.
-    let mut sum = F::ZERO;
-    for term in terms {
-        if term > largest {
-            sum = sum * (largest - term).exp() + F::ONE;
-            largest = term;
-        } else if term != F::NEG_INFINITY {
-            sum += (term - largest).exp();
-        }
-    }
-    largest + sum.ln()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const NONE: f64 = f64::NEG_INFINITY;
-
-    #[test]
-    fn a_sum_without_probability_is_minus_infinity_and_has_no_shares() {
-        assert_eq!(log_sum_exp::<f64>([]), NONE);
-        assert_eq!(log_sum_exp([NONE, NONE]), NONE);
-        assert_eq!(share(NONE, NONE), 0.0);
-        assert_eq!(share(NONE, -3.0), 0.0);
-    }
-
-    #[test]
-    fn a_sum_of_one_term_is_that_term_to_the_bit() {
-        let term = -0.123_456_789_f64;
-        for terms in [[term, NONE], [NONE, term]] {
-            assert_eq!(log_sum_exp(terms).to_bits(), term.to_bits());
-        }
-    }
-
-    #[test]
-    fn sums_do_not_depend_on_where_the_largest_term_stands() {
-        let expected = -1_000.0 + (1.0 + 2.0 * (-1.0_f64).exp()).ln();
-        for terms in [
-            [-1_000.0, -1_001.0, -1_001.0],
-            [-1_001.0, -1_000.0, -1_001.0],
-            [-1_001.0, -1_001.0, -1_000.0],
-        ] {
-            assert!((log_sum_exp(terms) - expected).abs() < 1e-12, "{terms:?}");
-        }
-    }
-
-    #[test]
-    fn what_is_not_a_number_is_not_hidden() {
-        for terms in [[f64::NAN, 0.0], [0.0, f64::NAN], [NONE, f64::NAN]] {
-            assert!(log_sum_exp(terms).is_nan(), "{terms:?}");
-        }
     }
 }

@@ -6,7 +6,7 @@
 
 use mackrl_env::{Action, AgentId};
 
-use crate::policy::PolicyTable;
+use crate::policy::{Part, PolicyTable, TEAM};
 
 /// An assignment of actions to some of the agents.
 pub type Assignment = Vec<(AgentId, Action)>;
@@ -38,58 +38,34 @@ pub struct Path {
 }
 
 impl Controller {
-    /// A controller of `agent` alone with the action probabilities `p_a` \[A\].
+    /// The hierarchy of `table` as a tree: the team and all that it may divide into.
     #[must_use]
-    pub fn of_agent(agent: AgentId, p_a: &[f64]) -> Self {
-        let act = |action| Choice::Act(vec![(agent, Action::new(action))]);
-        Self {
-            choices: p_a
-                .iter()
-                .enumerate()
-                .map(|(action, &p)| (p, act(action)))
-                .collect(),
-        }
+    pub fn of_team(table: &PolicyTable<'_, f64>) -> Self {
+        Self::of_group(
+            table,
+            Part {
+                level: TEAM,
+                group: 0,
+            },
+        )
     }
 
-    /// The pairwise hierarchy of `table`: pair selector, pair controllers and agent controllers as a tree of three levels.
-    #[must_use]
-    pub fn pairwise(table: &PolicyTable<'_, f64>) -> Self {
-        let agent_controller = |agent: AgentId| {
-            let p_a: Vec<f64> = table.agent(agent.index()).iter().map(|x| x.exp()).collect();
-            Self::of_agent(agent, &p_a)
-        };
-        let choices = table
-            .partitions()
-            .iter()
-            .zip(table.selector())
-            .map(|(partition, log_p)| {
-                let pairs = partition.pairs().iter().map(|pair| {
-                    let delegate = Choice::Divide(pair.agents().map(agent_controller).into());
-                    Self::of_pair(pair.agents(), table.pair(pair.index()), &delegate, table)
-                });
-                let alone = partition.singleton().map(agent_controller);
-                (log_p.exp(), Choice::Divide(pairs.chain(alone).collect()))
-            })
-            .collect();
-        Self { choices }
-    }
-
-    fn of_pair(
-        members: [AgentId; 2],
-        log_p_c: &[f64],
-        delegate: &Choice,
-        table: &PolicyTable<'_, f64>,
-    ) -> Self {
-        let choice = |column| match table.shape().joint_action(column) {
-            Some(actions) => Choice::Act(members.into_iter().zip(actions).collect()),
-            None => delegate.clone(),
-        };
+    fn of_group(table: &PolicyTable<'_, f64>, part: Part) -> Self {
+        let members = table.declaration().members(part);
+        let actions = table.declaration().actions();
+        let divisions = table.divisions(part);
+        let choices = table.row(part).iter().enumerate().map(|(column, log_p)| {
+            let choice = match divisions.get(column) {
+                Some(division) => {
+                    let parts = division.parts.iter();
+                    Choice::Divide(parts.map(|part| Self::of_group(table, *part)).collect())
+                }
+                None => Choice::Act(joint_action(members, actions, column - divisions.len())),
+            };
+            (log_p.exp(), choice)
+        });
         Self {
-            choices: log_p_c
-                .iter()
-                .enumerate()
-                .map(|(column, log_p)| (log_p.exp(), choice(column)))
-                .collect(),
+            choices: choices.collect(),
         }
     }
 
@@ -150,6 +126,17 @@ impl Controller {
             };
         }
     }
+}
+
+/// The joint action of `members` that has this number: its digits to the base of the number of actions, the first member's
+/// first.
+fn joint_action(members: &[AgentId], actions: usize, mut number: usize) -> Assignment {
+    let mut assignment = Assignment::new();
+    for &member in members.iter().rev() {
+        assignment.insert(0, (member, Action::new(number % actions)));
+        number /= actions;
+    }
+    assignment
 }
 
 impl Choice {

@@ -107,8 +107,12 @@ impl UpdateProbe {
             }
         }
         self.gradient.fill(0.0);
-        self.network
-            .backward(&self.weights, &mut self.trace, &mut self.gradient);
+        self.network.backward(
+            &self.weights,
+            &self.inputs,
+            &mut self.trace,
+            &mut self.gradient,
+        );
         let norm = clip_gradient_norm(&mut self.gradient, 10.0);
         self.optimiser
             .step(5e-4, &self.gradient, &mut self.parameters);
@@ -121,9 +125,8 @@ impl UpdateProbe {
         self.trace.begin_episode();
         for t in 0..self.steps {
             self.trace.begin_step(self.rows, None);
-            let step = &self.inputs[t * self.rows * inputs..][..self.rows * inputs];
-            self.trace.input_mut().copy_from_slice(step);
-            self.network.step(&self.weights, &mut self.trace);
+            let x = &self.inputs[t * self.rows * inputs..][..self.rows * inputs];
+            self.network.step(&self.weights, x, &mut self.trace);
             let place = t * self.rows * outputs..(t + 1) * self.rows * outputs;
             law.forward(
                 self.trace.last_logits(),

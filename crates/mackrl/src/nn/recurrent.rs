@@ -106,10 +106,14 @@ impl RecurrentNetwork {
 
     /// Computes the current step of a trace from its inputs.
     ///
+    /// # Shapes
+    /// `x` [rows, inputs]: the inputs of the current step.
+    ///
     /// # Panics
-    /// If no step was begun, or if the trace is for other sizes.
-    pub fn step<E: Element>(&self, weights: &RecurrentWeights<E>, trace: &mut Trace<E>) {
+    /// If no step was begun, if the trace is for other sizes or was used up, or if there are not as many inputs.
+    pub fn step<E: Element>(&self, weights: &RecurrentWeights<E>, x: &[E], trace: &mut Trace<E>) {
         assert_eq!(trace.sizes, self.sizes(), "sizes of the trace");
+        assert!(!trace.spent, "an episode that was differentiated has ended");
         let NetworkSizes {
             inputs,
             hidden,
@@ -117,10 +121,10 @@ impl RecurrentNetwork {
         } = trace.sizes;
         let range = trace.last_rows();
         let (first, rows) = (range.start, range.len());
+        assert_eq!(x.len(), rows * inputs, "inputs are [rows, inputs]");
         if rows == 0 {
             return;
         }
-        let x = &trace.inputs.as_slice()[first * inputs..];
         let features = &mut trace.features.as_mut_slice()[first * hidden..][..rows * hidden];
         self.input.forward(&weights.input, rows, x, features);
         E::dispatch(Rectify { values: features });
@@ -155,17 +159,30 @@ impl RecurrentNetwork {
     /// Back-propagates the gradients of the logits through all steps and adds the parameters' gradients to the flat
     /// `gradient`.
     ///
-    /// The trace's activations are used up: a trace can be differentiated once.
+    /// The trace's activations are used up, because gates become their gradients in place: to differentiate again, the
+    /// episode has to be computed again, step by step, from its inputs.
+    ///
+    /// # Shapes
+    /// `x` [rows of all steps, inputs]: what the steps were computed from.
     ///
     /// # Panics
-    /// If the trace is for other sizes or does not hold the whole episode.
+    /// If the trace is for other sizes, does not hold the whole episode or was used up, or if there are not as many inputs.
     pub fn backward<E: Element>(
         &self,
         weights: &RecurrentWeights<E>,
+        x: &[E],
         trace: &mut Trace<E>,
         gradient: &mut [E],
     ) {
         assert_eq!(trace.sizes, self.sizes(), "sizes of the trace");
+        assert!(!trace.spent, "activations can be differentiated once");
+        let rows = trace.steps.last().map_or(0, |step| step.rows.end);
+        assert_eq!(
+            x.len(),
+            rows * trace.sizes.inputs,
+            "inputs are [rows of all steps, inputs]"
+        );
+        trace.spent = true;
         assert_eq!(
             trace.steps.len(),
             trace.steps(),
@@ -193,7 +210,7 @@ impl RecurrentNetwork {
             if !rows.is_empty() {
                 let asked = trace.steps[block.start].asked.start..trace.steps[end - 1].asked.end;
                 self.output_gradient(trace, asked, gradient);
-                self.parameter_gradient(trace, rows, gradient);
+                self.parameter_gradient(x, trace, rows, gradient);
             }
             end = block.start;
         }
@@ -306,6 +323,7 @@ impl RecurrentNetwork {
     /// Adds the gradients of the other layers' parameters over some rows of a trace whose gates already are gradients.
     fn parameter_gradient<E: Element>(
         &self,
+        x: &[E],
         trace: &mut Trace<E>,
         rows: Range<usize>,
         gradient: &mut [E],
@@ -323,7 +341,7 @@ impl RecurrentNetwork {
         self.gru
             .parameter_gradient(count, features, previous, gates, gradient, scratch);
 
-        let x = &trace.inputs.as_slice()[first * inputs..];
+        let x = &x[first * inputs..];
         self.input
             .parameter_gradient(count, x, features_gradient.as_slice(), gradient, scratch);
     }

@@ -1,7 +1,7 @@
 //! The activations of a recurrent network over an episode.
 //!
 //! The caller owns a trace and uses it from update to update; it is filled while acting and read by the backward pass, so
-//! there is no second forward pass, and after the longest episode nothing is allocated any more. All steps lie one after the
+//! there is no second forward pass (the inputs are the caller's, too, and stay there), and after the longest episode nothing is allocated any more. All steps lie one after the
 //! other, however many rows each has: products over whole steps or many steps see one matrix.
 
 use std::ops::Range;
@@ -39,11 +39,11 @@ pub struct Trace<R> {
     /// Whether only the rows that are asked for get logits.
     pub(crate) selective: bool,
     steps_begun: usize,
+    /// Whether a backward pass has used the activations up.
+    pub(crate) spent: bool,
     pub(crate) steps: Vec<Step>,
     /// For every row, the row of the previous step that it continues.
     pub(crate) carry: Vec<usize>,
-    /// [rows, inputs]
-    pub(crate) inputs: Aligned<R>,
     /// [rows, hidden], the rectified output of the first layer.
     pub(crate) features: Aligned<R>,
     /// [rows, hidden], the hidden state that each row continues.
@@ -97,9 +97,9 @@ impl<R: Real> Trace<R> {
             retention,
             selective,
             steps_begun: 0,
+            spent: false,
             steps: Vec::new(),
             carry: Vec::new(),
-            inputs: Aligned::default(),
             features: Aligned::default(),
             previous: Aligned::default(),
             gates: Aligned::default(),
@@ -115,12 +115,13 @@ impl<R: Real> Trace<R> {
     /// Forgets all steps; the next one starts from a hidden state of zero.
     pub fn begin_episode(&mut self) {
         self.steps_begun = 0;
+        self.spent = false;
         self.steps.clear();
         self.carry.clear();
         self.asked.clear();
     }
 
-    /// Begins a step of `rows` rows whose inputs are all zero.
+    /// Begins a step of `rows` rows.
     ///
     /// Row i continues row `carry[i]` of the previous step, or row i where `carry` is `None`. The first step of an episode
     /// has nothing to continue and ignores `carry`.
@@ -161,8 +162,6 @@ impl<R: Real> Trace<R> {
             states.fill(R::ZERO);
             self.carry.extend(0..rows);
         }
-        let inputs = self.sizes.inputs;
-        self.inputs.as_mut_slice()[start * inputs..][..rows * inputs].fill(R::ZERO);
         let unchanged = carry.is_none() && previous.is_none_or(|previous| previous.len() == rows);
         let asked = if self.selective { 0 } else { rows };
         self.logits.grow((first_asked + asked) * self.sizes.outputs);
@@ -194,14 +193,10 @@ impl<R: Real> Trace<R> {
         self.asked_hidden.grow(end * self.sizes.hidden);
     }
 
-    /// The inputs of the current step [rows, inputs], to be filled; all zero when the step begins.
-    ///
-    /// # Panics
-    /// If no step was begun.
-    pub fn input_mut(&mut self) -> &mut [R] {
-        let rows = self.last_rows();
-        let inputs = self.sizes.inputs;
-        &mut self.inputs.as_mut_slice()[rows.start * inputs..rows.end * inputs]
+    /// Whether a backward pass has used the activations up; a new episode begins unspent.
+    #[must_use]
+    pub const fn is_spent(&self) -> bool {
+        self.spent
     }
 
     /// How many steps the episode has so far.
@@ -217,15 +212,6 @@ impl<R: Real> Trace<R> {
     #[must_use]
     pub fn rows(&self, t: usize) -> usize {
         self.rows_of(t).len()
-    }
-
-    /// The inputs of step `t` [rows, inputs].
-    ///
-    /// # Panics
-    /// If the trace does not hold step `t`.
-    #[must_use]
-    pub fn inputs(&self, t: usize) -> &[R] {
-        rows_of(&self.inputs, self.rows_of(t), self.sizes.inputs)
     }
 
     /// The hidden state after step `t` [rows, hidden].
@@ -312,8 +298,7 @@ impl<R: Real> Trace<R> {
     }
 
     fn grow(&mut self, rows: usize) {
-        let NetworkSizes { inputs, hidden, .. } = self.sizes;
-        self.inputs.grow(rows * inputs);
+        let hidden = self.sizes.hidden;
         self.features.grow(rows * hidden);
         self.previous.grow(rows * hidden);
         self.gates.grow(rows * GATES * hidden);
@@ -339,7 +324,6 @@ mod tests {
         trace.begin_episode();
         for _ in 0..steps {
             trace.begin_step(11, None);
-            trace.input_mut().fill(1.0);
             let t = trace.steps() - 1;
             trace.logits_gradient_mut(t).fill(1.0);
         }
@@ -349,19 +333,10 @@ mod tests {
     fn a_later_episode_moves_no_buffer() {
         let mut trace = Trace::new(SIZES, Retention::Episode);
         run_episode(&mut trace, 13);
-        let places = [trace.inputs(0).as_ptr(), trace.logits(0).as_ptr()];
+        let places = [trace.hidden(0).as_ptr(), trace.logits(0).as_ptr()];
         run_episode(&mut trace, 13);
-        assert_eq!(trace.inputs(0).as_ptr(), places[0], "place of the inputs");
+        assert_eq!(trace.hidden(0).as_ptr(), places[0], "place of the states");
         assert_eq!(trace.logits(0).as_ptr(), places[1], "place of the logits");
-    }
-
-    #[test]
-    fn inputs_are_zero_when_a_step_begins() {
-        let mut trace = Trace::new(SIZES, Retention::Episode);
-        run_episode(&mut trace, 2);
-        trace.begin_episode();
-        trace.begin_step(2, None);
-        assert_eq!(trace.input_mut(), [0.0; 6], "inputs");
     }
 
     #[test]

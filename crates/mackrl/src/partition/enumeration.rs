@@ -56,6 +56,62 @@ fn extend_matchings(
     }
 }
 
+/// Every way to divide `members` into groups of `size` and one smaller group of what is left, if anything is left: those
+/// that leave out the first members come first. Each group is in the order of `members`; the smaller one is the last.
+///
+/// # Panics
+/// If `size` is 0.
+#[must_use]
+pub fn ways_to_divide(members: &[AgentId], size: usize) -> Vec<Vec<Vec<AgentId>>> {
+    assert!(size > 0, "a group has a member");
+    let left = members.len() % size;
+    if left > 0 {
+        let ways = choices(members, left).into_iter();
+        return ways
+            .flat_map(|(last, rest)| {
+                let mut ways = ways_to_divide(&rest, size);
+                ways.iter_mut().for_each(|way| way.push(last.clone()));
+                ways
+            })
+            .collect();
+    }
+    let Some((&first, others)) = members.split_first() else {
+        return vec![Vec::new()];
+    };
+    let ways = choices(others, size - 1).into_iter();
+    ways.flat_map(|(companions, rest)| {
+        let group: Vec<AgentId> = [first].into_iter().chain(companions).collect();
+        let ways = ways_to_divide(&rest, size).into_iter();
+        let with_group = ways.map(move |way| [vec![group.clone()], way].concat());
+        with_group.collect::<Vec<_>>()
+    })
+    .collect()
+}
+
+/// Every choice of `count` of `members`, and those that are left, both in their order.
+fn choices(members: &[AgentId], count: usize) -> Vec<(Vec<AgentId>, Vec<AgentId>)> {
+    let Some((&first, others)) = members.split_first() else {
+        let nothing = (Vec::new(), Vec::new());
+        return if count == 0 {
+            vec![nothing]
+        } else {
+            Vec::new()
+        };
+    };
+    let mut found = Vec::new();
+    if count > 0 {
+        for (mut chosen, rest) in choices(others, count - 1) {
+            chosen.insert(0, first);
+            found.push((chosen, rest));
+        }
+    }
+    for (chosen, mut rest) in choices(others, count) {
+        rest.insert(0, first);
+        found.push((chosen, rest));
+    }
+    found
+}
+
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeSet;
@@ -97,5 +153,31 @@ mod tests {
             .filter_map(|partition| partition.singleton().map(AgentId::index))
             .collect();
         assert_eq!(left_out, [0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4]);
+    }
+
+    #[test]
+    fn ways_to_divide_into_pairs_are_the_partitions() {
+        for agents in 0..=7 {
+            let team: Vec<AgentId> = (0..agents).map(AgentId::new).collect();
+            let mut found: Vec<Partition> = ways_to_divide(&team, 2)
+                .iter()
+                .map(|way| Partition::from_order(&way.concat()))
+                .collect();
+            let mut expected = all_partitions(agents);
+            found.sort();
+            expected.sort();
+            assert_eq!(found, expected, "{agents} agents");
+        }
+    }
+
+    #[test]
+    fn what_is_left_of_groups_of_four_comes_last() {
+        let team: Vec<AgentId> = (0..6).map(AgentId::new).collect();
+        let ways = ways_to_divide(&team, 4);
+        assert_eq!(ways.len(), 15);
+        assert!(
+            ways.iter()
+                .all(|way| way[0].len() == 4 && way[1].len() == 2)
+        );
     }
 }

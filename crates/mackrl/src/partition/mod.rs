@@ -12,7 +12,7 @@ mod round_robin;
 mod sample;
 mod schedule;
 
-pub use enumeration::{all_partitions, partition_count};
+pub use enumeration::{all_partitions, partition_count, ways_to_divide};
 pub use pairs::{Pair, Pairs};
 pub use sample::sample_partitions;
 pub use schedule::{PartitionBuffer, PartitionSchedule, Partitions};

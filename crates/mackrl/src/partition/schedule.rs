@@ -92,6 +92,12 @@ impl Partitions {
         self.fixed.len().max(1)
     }
 
+    /// The partitions in force at every step; none if they change from step to step.
+    #[must_use]
+    pub fn fixed(&self) -> &[Partition] {
+        &self.fixed
+    }
+
     /// Whether the same partitions are in force at every step, so that every possible pair can be formed at every step.
     #[must_use]
     pub const fn are_fixed(&self) -> bool {

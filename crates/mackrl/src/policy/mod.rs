@@ -1,31 +1,37 @@
-//! What acting and learning share: one step's table of log-probabilities, and the traits of a policy that learns from the
-//! marginal of the joint action.
+//! What acting and learning share: the declared hierarchy, one step's table of log-probabilities, the walk down it, and the
+//! traits of what acts.
 //!
-//! A [`Policy`] says which controllers there are and how their parameters are called; an [`Actor`] is the working memory of
-//! a few environments that are played together. The split is what lets shards run on any number of threads: parameters are read by all, and everything written
-//! belongs to one actor. An actor keeps the activations of its episodes, so that learning needs no second forward pass:
-//! parameters do not change between acting and the update.
+//! A [`Policy`] says how its parameters are called and makes what acts; an [`Actor`] is the working memory of a few
+//! environments that are played together, an [`Executor`] that of one agent alone. The split is what lets shards run on any
+//! number of threads: parameters are read by all, and everything written belongs to one actor.
 
-mod tables;
+mod declaration;
+mod parameters;
+mod table;
 mod tally;
 mod thought;
+mod walk;
 
-use std::fmt::Debug;
+use std::{any::Any, borrow::Cow, fmt::Debug};
 
-use mackrl_env::{Action, AgentId, EpisodeKey, Observations};
+use mackrl_env::{Action, AgentId, EpisodeKey, LocalView, Observations};
 use serde::{Deserialize, Serialize};
 
-pub use tables::{DELEGATE, PolicyShape, PolicyTable};
+pub use declaration::{
+    Declaration, Delegation, Division, DivisionBuffer, LEVELS_MAX, Level, Part, Reads, Selection,
+    TEAM,
+};
+pub use parameters::Parameters;
+pub use table::PolicyTable;
 pub use tally::Tally;
 pub(crate) use thought::most_probable;
 pub use thought::{
-    AgentThought, Choice, JointOption, PairThought, PartitionThought, SoloOption, Thought,
+    AgentThought, GroupChoice, GroupThought, JointOption, PairThought, PartitionThought,
+    SoloOption, Thought,
 };
+pub use walk::{Path, Sampler};
 
-use crate::{
-    NotFinite, Stopwatch,
-    nn::{Named, ParameterLayout, RecurrentWeights},
-};
+use crate::{NotFinite, Stopwatch, experience::Experience, nn::ParameterLayout};
 
 /// How a controller turns its distribution into a choice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -91,18 +97,7 @@ pub struct Situation<'a> {
     pub behaviour: Behaviour,
 }
 
-/// The weights of all controllers as they are computed with: a copy of the parameters, refreshed after every update.
-#[derive(Debug, Clone)]
-pub struct Weights {
-    /// Of the pair selector, if partitions are chosen.
-    pub(crate) selector: Option<RecurrentWeights<f32>>,
-    /// Of the pair controllers, if there are pairs.
-    pub(crate) pairs: Option<RecurrentWeights<f32>>,
-    /// Of the agent controllers.
-    pub(crate) agents: RecurrentWeights<f32>,
-}
-
-/// A team's policy: the controllers and the names of their parameters.
+/// A team's policy: the names of its parameters, and what acts with them.
 pub trait Policy: Send + Sync + Debug {
     /// Names and shapes of the parameters.
     fn layout(&self) -> &ParameterLayout;
@@ -110,22 +105,20 @@ pub trait Policy: Send + Sync + Debug {
     /// Random initial parameters, a function of `seed`.
     fn initialise(&self, seed: u64) -> Vec<f32>;
 
-    /// The controllers' weights under `parameters`.
-    fn weights(&self, parameters: &[f32]) -> Weights;
-
-    /// Brings `weights` up to date with `parameters`, without allocating.
-    fn refresh(&self, parameters: &[f32], weights: &mut Weights);
-
-    /// Working memory for `environments` environments.
+    /// Working memory for `environments` environments that are played together.
     fn actor(&self, environments: usize) -> Box<dyn Actor>;
+
+    /// Working memory for `agent` alone.
+    fn executor(&self, agent: AgentId) -> Box<dyn Executor>;
 }
 
-/// Plays a team in several environments at once and remembers what learning needs.
+/// Plays a team in several environments at once.
 pub trait Actor: Send {
-    /// Starts new episodes, with all hidden states zero.
-    fn begin(&mut self, recording: Recording);
+    /// Starts new episodes, with all hidden states zero, and takes over the banks of `experience`, which keep their memory.
+    fn begin(&mut self, recording: Recording, experience: &mut Experience);
 
-    /// Chooses the actions of one step in every environment that is still playing.
+    /// Chooses the actions of one step in every environment that is still playing, and adds to `experience` what the
+    /// controllers read.
     ///
     /// # Shapes
     /// `actions_bn` \[B, N\]; rows of environments that have left are not touched.
@@ -134,37 +127,28 @@ pub trait Actor: Send {
     /// [`NotFinite`] if a controller's logit is not finite: there is nothing to choose from then.
     fn act(
         &mut self,
-        weights: &Weights,
+        parameters: &Parameters,
         situation: Situation<'_>,
+        experience: &mut Experience,
         actions_bn: &mut [Action],
     ) -> Result<(), NotFinite>;
 
-    /// Adds `Σ_{b,t} weight_bt ∇ log p(u_t)` to `gradient` and returns `Σ_{b,t} weight_bt log p(u_t)`, where p is the
-    /// marginal probability (eq. 5) of the joint action that was taken.
-    ///
-    /// # Shapes
-    /// `weight_bt` \[B\]\[T\], each episode with its own T; `gradient` as the policy's layout.
-    fn backward(&mut self, weights: &Weights, weight_bt: &[Vec<f32>], gradient: &mut [f32]) -> f64;
-
     /// Adds what was seen since [`Self::begin`] (entropies, delegation, …) to `tally`.
-    fn report(&self, tally: &mut Tally);
+    fn report(&self, tally: &mut Tally) {
+        let _ = tally;
+    }
 
     /// Measures where the time of this actor and of the environments that it plays in goes, once it is started.
     fn stopwatch(&mut self) -> &mut Stopwatch;
 
-    /// What was computed since [`Self::begin`], in that order, for whoever looks for a number that is not finite. An actor
-    /// that keeps nothing has nothing to show.
-    fn activations(&self) -> Vec<Named<'_, f32>> {
-        Vec::new()
-    }
-
-    /// What the latest backward pass computed on its way to the parameters' gradients, in that order.
-    fn gradients(&self) -> Vec<Named<'_, f32>> {
-        Vec::new()
+    /// What was computed while acting and can save a learner of the same kind a forward pass: a cache beside the experience,
+    /// and never a part of it.
+    fn cache(&mut self) -> Option<&mut dyn Any> {
+        None
     }
 
     /// What the controllers of environment `b` read at the latest step.
-    fn controller_inputs(&self, b: usize) -> Vec<ControllerInput>;
+    fn controller_inputs(&self, experience: &Experience, b: usize) -> Vec<ControllerInput>;
 
     /// What the controllers of environment `b` computed at the latest step, which was `situation` and led to `action_n` \[N\].
     /// Nothing, for actors that have no controllers to look into.
@@ -174,16 +158,34 @@ pub trait Actor: Send {
     }
 }
 
-/// Names one controller of the hierarchy.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ControllerId {
-    /// `π_ps`
-    PairSelector,
-    /// `π_pc` of these two agents, the lower first.
-    PairController(AgentId, AgentId),
-    /// `π_a` of this agent.
-    AgentController(AgentId),
+/// Plays one agent from its own local views.
+pub trait Executor: Send {
+    /// Starts a new episode, with all hidden states zero.
+    fn begin(&mut self);
+
+    /// Chooses the agent's action at `step` of the episode `key`. Draws that concern a group are derived from the key by
+    /// each member alone.
+    fn act(
+        &mut self,
+        parameters: &Parameters,
+        view: LocalView<'_>,
+        key: &EpisodeKey,
+        step: usize,
+        behaviour: Behaviour,
+    ) -> Action;
+
+    /// What this agent's controllers read at the latest step.
+    fn controller_inputs(&self) -> Vec<ControllerInput>;
+}
+
+/// Names one controller: its level's name, and whose it is.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ControllerId {
+    /// As the tensors of its network begin: `pair_controller`.
+    pub name: Cow<'static, str>,
+    /// The members of its group, ascending.
+    pub agents: Vec<AgentId>,
 }
 
 /// What one controller read at one step.

@@ -16,6 +16,9 @@ pub struct Thought {
     /// Index of the partition that was chosen.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chosen: Option<usize>,
+    /// Every group that divides further after the team did and before pairs act, such as fours.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub groups: Vec<GroupThought>,
     /// Every pair of living agents that some partition can contain.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pairs: Vec<PairThought>,
@@ -39,6 +42,21 @@ pub struct PartitionThought {
     pub posterior: f32,
 }
 
+/// What the controller of a group computed that divides.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GroupThought {
+    /// Its members, ascending.
+    pub members: Vec<AgentId>,
+    /// What they commonly know.
+    pub known: Vec<EntityId>,
+    /// The ways in which it may divide.
+    pub divisions: Vec<PartitionThought>,
+    /// The way that it chose; absent if it was not asked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chosen: Option<usize>,
+}
+
 /// What the controller of one pair computed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -54,7 +72,7 @@ pub struct PairThought {
     pub joint: Vec<JointOption>,
     /// What the pair chose; absent if the chosen partition does not contain it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub choice: Option<Choice>,
+    pub choice: Option<GroupChoice>,
     /// The probability, given the joint action alone, that the pair was formed and acted jointly.
     pub posterior_joint: f32,
     /// The probability, given the joint action alone, that the pair was formed and delegated.
@@ -64,7 +82,7 @@ pub struct PairThought {
 /// What a pair did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Choice {
+pub enum GroupChoice {
     /// Acted jointly.
     Joint,
     /// Left it to its members.

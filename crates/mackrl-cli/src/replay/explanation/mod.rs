@@ -2,7 +2,7 @@
 
 mod text;
 
-use mackrl::policy::{Choice, PairThought, Thought};
+use mackrl::policy::{GroupChoice, PairThought, Thought};
 use mackrl_env::{Action, AgentId, EntityId, EntitySet};
 use mackrl_run::replay::GroupKnowledge;
 use serde::Serialize;
@@ -89,7 +89,7 @@ struct Partition {
 #[derive(Debug, Serialize)]
 struct Pair {
     members: [String; 2],
-    choice: Option<Choice>,
+    choice: Option<GroupChoice>,
     delegate_probability: f32,
     joint: Vec<Entry>,
     posterior_joint: f32,
@@ -306,8 +306,8 @@ impl Writer<'_> {
         for pair in &thought.pairs {
             let Some(choice) = pair.choice else { continue };
             let (choice, probability) = match choice {
-                Choice::Delegate => ("delegate".to_owned(), pair.delegate),
-                Choice::Joint => {
+                GroupChoice::Delegate => ("delegate".to_owned(), pair.delegate),
+                GroupChoice::Joint => {
                     let actions = pair.members.map(taken);
                     let mut options = pair.joint.iter();
                     let option = options.find(|option| option.actions == actions);

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use mackrl::policy::Choice;
+use mackrl::policy::GroupChoice;
 
 use super::{Controllers, Explanation, Knowledge, Pair};
 use crate::output;
@@ -165,11 +165,11 @@ impl Pair {
         let members = self.members.join(", ");
         let delegate = format!(
             "{members}: {} delegate",
-            mark(self.choice == Some(Choice::Delegate))
+            mark(self.choice == Some(GroupChoice::Delegate))
         );
         let mut rows = vec![vec![delegate, format!("{:.4}", self.delegate_probability)]];
         rows.extend(self.joint.iter().map(|option| {
-            let is_taken = option.is_taken && self.choice == Some(Choice::Joint);
+            let is_taken = option.is_taken && self.choice == Some(GroupChoice::Joint);
             let name = format!("{members}: {} {}", mark(is_taken), option.action);
             vec![name, format!("{:.4}", option.probability)]
         }));

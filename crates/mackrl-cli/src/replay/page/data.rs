@@ -1,6 +1,6 @@
 //! What a page knows of a replay: numbers short enough for a long battle of many units.
 
-use mackrl::policy::{Choice, Mode, PairThought};
+use mackrl::policy::{GroupChoice, Mode, PairThought};
 use mackrl_env::{Action, AgentId, EntityId, Environment};
 use mackrl_run::replay::Player;
 use mackrl_skirmish::terrain::MAP_SIZE;
@@ -84,7 +84,7 @@ struct Pair {
     /// Number of entities that are common knowledge.
     known: usize,
     delegate: f64,
-    choice: Option<Choice>,
+    choice: Option<GroupChoice>,
     joint: Vec<(Action, Action, f64)>,
 }
 

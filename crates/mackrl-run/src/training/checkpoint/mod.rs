@@ -11,19 +11,20 @@
 //! | `opt.adam.m.NAME`, `opt.adam.v.NAME` | Adam's averages of gradients and of their squares |
 //! | `opt.rmsprop.v.NAME` | `RMSprop`'s averages of squared gradients |
 
+use std::collections::BTreeMap;
+
 use mackrl::{
     Error,
-    central_critic::CriticState,
-    learner::LearnerState,
-    nn::{Moments, OptimiserKind, ParameterLayout},
+    algorithms::{AlgorithmState, StoredState},
+    nn::ParameterLayout,
     policy::Tally,
 };
 use serde::{Deserialize, Serialize};
 
-use super::{metrics::is_explained, read_weights, write_weights};
+use super::{read_weights, write_weights};
 
 /// Version of the format; it changes when an older program could not continue from a checkpoint.
-const FORMAT: u64 = 2;
+const FORMAT: u64 = 3;
 /// The largest count that every reader of JSON can hold: 2⁵³.
 const COUNT_MAX: u64 = 1 << 53;
 
@@ -34,13 +35,6 @@ pub struct Checkpoint {
     pub tensors: Vec<u8>,
     /// Counters and sums, as JSON.
     pub counters: Vec<u8>,
-}
-
-/// What a checkpoint holds, in memory.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct State {
-    pub(super) learner: LearnerState,
-    pub(super) counters: Counters,
 }
 
 /// The trainer's own part.
@@ -63,32 +57,33 @@ pub(super) struct Counters {
     pub(super) interval: Tally,
 }
 
-/// How the arrays of a checkpoint are called.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Layouts<'a> {
-    pub(super) policy: &'a ParameterLayout,
-    pub(super) critic: &'a ParameterLayout,
-    pub(super) optimiser: OptimiserKind,
-}
-
 /// The JSON object.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Numbers {
     format: u64,
-    learner: Updates,
-    critic: Updates,
-    /// Critic updates when the target critic was refreshed.
-    critic_updates_at_refresh: u64,
+    /// What the algorithm counts.
+    algorithm: BTreeMap<String, u64>,
     trainer: Counters,
 }
 
-/// How often a model changed.
-#[derive(Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Updates {
-    updates: u64,
-    optimiser_steps: u64,
+/// A checkpoint that was read: the trainer's part, and what the algorithm finds its own in.
+#[derive(Debug)]
+pub(super) struct Opened<'a> {
+    tensors: &'a [u8],
+    algorithm: BTreeMap<String, u64>,
+    pub(super) trainer: Counters,
+}
+
+impl StoredState for Opened<'_> {
+    fn tensors(&self, layout: &ParameterLayout) -> Result<Vec<f32>, Error> {
+        read_weights(layout, self.tensors)
+    }
+
+    fn counter(&self, name: &str) -> Result<u64, Error> {
+        let count = self.algorithm.get(name).copied();
+        count.ok_or_else(|| Error::Data(format!("checkpoint has no count `{name}`")))
+    }
 }
 
 /// The part of the JSON object that every version has.
@@ -98,35 +93,15 @@ struct Format {
 }
 
 impl Checkpoint {
-    pub(super) fn write(layouts: &Layouts<'_>, state: &State) -> Self {
-        let State { learner, counters } = state;
-        let critic = &learner.critic;
-        let target = layouts.critic.prefixed("target.");
-        let [policy_first, policy_second] = layouts.moments(layouts.policy);
-        let [critic_first, critic_second] = layouts.moments(layouts.critic);
-        let mut models: Vec<(&ParameterLayout, &[f32])> = vec![
-            (layouts.policy, &learner.parameters),
-            (layouts.critic, &critic.parameters),
-            (&target, &critic.target_parameters),
-            (&policy_second, &learner.moments.second),
-            (&critic_second, &critic.moments.second),
-        ];
-        if layouts.has_first_moments() {
-            models.push((&policy_first, &learner.moments.first));
-            models.push((&critic_first, &critic.moments.first));
-        }
+    pub(super) fn write(algorithm: &AlgorithmState, trainer: &Counters) -> Self {
+        let tensors = algorithm.tensors.iter();
+        let models: Vec<(&ParameterLayout, &[f32])> = tensors
+            .map(|(layout, values)| (layout, values.as_slice()))
+            .collect();
         let numbers = Numbers {
             format: FORMAT,
-            learner: Updates {
-                updates: learner.updates,
-                optimiser_steps: learner.moments.steps,
-            },
-            critic: Updates {
-                updates: critic.updates,
-                optimiser_steps: critic.moments.steps,
-            },
-            critic_updates_at_refresh: critic.updates_at_refresh,
-            trainer: counters.clone(),
+            algorithm: algorithm.counters.clone(),
+            trainer: trainer.clone(),
         };
         let mut json = serde_json::to_vec_pretty(&numbers).expect("numbers can be written");
         json.push(b'\n');
@@ -136,39 +111,14 @@ impl Checkpoint {
         }
     }
 
-    pub(super) fn read(&self, layouts: &Layouts<'_>) -> Result<State, Error> {
+    /// Reads the counters and checks them; `is_explained` says whether a metric has this name.
+    pub(super) fn open(&self, is_explained: impl Fn(&str) -> bool) -> Result<Opened<'_>, Error> {
         let numbers = self.numbers()?;
-        let read = |layout: &ParameterLayout| read_weights(layout, &self.tensors);
-        let moments = |layout: &ParameterLayout, steps| {
-            let [first, second] = layouts.moments(layout);
-            let first = if layouts.has_first_moments() {
-                read(&first)?
-            } else {
-                Vec::new()
-            };
-            let second = read(&second)?;
-            Ok::<_, Error>(Moments {
-                steps,
-                first,
-                second,
-            })
-        };
-        let critic = CriticState {
-            parameters: read(layouts.critic)?,
-            target_parameters: read(&layouts.critic.prefixed("target."))?,
-            moments: moments(layouts.critic, numbers.critic.optimiser_steps)?,
-            updates: numbers.critic.updates,
-            updates_at_refresh: numbers.critic_updates_at_refresh,
-        };
-        let learner = LearnerState {
-            parameters: read(layouts.policy)?,
-            moments: moments(layouts.policy, numbers.learner.optimiser_steps)?,
-            updates: numbers.learner.updates,
-            critic,
-        };
-        Ok(State {
-            learner,
-            counters: numbers.trainer,
+        numbers.check(is_explained)?;
+        Ok(Opened {
+            tensors: &self.tensors,
+            algorithm: numbers.algorithm,
+            trainer: numbers.trainer,
         })
     }
 
@@ -180,15 +130,13 @@ impl Checkpoint {
                 "checkpoint has format {format}, expected {FORMAT}"
             )));
         }
-        let numbers: Numbers = serde_json::from_slice(&self.counters).map_err(broken)?;
-        numbers.check()?;
-        Ok(numbers)
+        serde_json::from_slice(&self.counters).map_err(broken)
     }
 }
 
 impl Numbers {
     /// Refuses what no run can have counted.
-    fn check(&self) -> Result<(), Error> {
+    fn check(&self, is_explained: impl Fn(&str) -> bool) -> Result<(), Error> {
         let Counters {
             steps_env,
             episodes,
@@ -207,26 +155,13 @@ impl Numbers {
             ("next_test", *next_test, 2 * COUNT_MAX),
             ("next_row", *next_row, 2 * COUNT_MAX),
             ("interval_steps_env", *interval_steps_env, *steps_env),
-            ("learner.updates", self.learner.updates, COUNT_MAX),
-            ("critic.updates", self.critic.updates, COUNT_MAX),
-            (
-                "critic_updates_at_refresh",
-                self.critic_updates_at_refresh,
-                self.critic.updates,
-            ),
-            (
-                "learner.optimiser_steps",
-                self.learner.optimiser_steps,
-                COUNT_MAX,
-            ),
-            (
-                "critic.optimiser_steps",
-                self.critic.optimiser_steps,
-                COUNT_MAX,
-            ),
         ];
-        if let Some((name, found, most)) = counts.into_iter().find(|(_, found, most)| found > most)
-        {
+        let own = self
+            .algorithm
+            .iter()
+            .map(|(name, count)| (name.as_str(), *count, COUNT_MAX));
+        let mut counts = counts.into_iter().chain(own);
+        if let Some((name, found, most)) = counts.find(|(_, found, most)| found > most) {
             return Err(Error::Data(format!(
                 "checkpoint counts {found} as `{name}`, expected at most {most}"
             )));
@@ -237,21 +172,6 @@ impl Numbers {
             ))),
             None => Ok(()),
         }
-    }
-}
-
-impl Layouts<'_> {
-    /// The names of the first and the second moments.
-    fn moments(&self, layout: &ParameterLayout) -> [ParameterLayout; 2] {
-        let name = match self.optimiser {
-            OptimiserKind::Adam { .. } => "adam",
-            OptimiserKind::RmsProp { .. } => "rmsprop",
-        };
-        ["m", "v"].map(|moment| layout.prefixed(&format!("opt.{name}.{moment}.")))
-    }
-
-    const fn has_first_moments(&self) -> bool {
-        matches!(self.optimiser, OptimiserKind::Adam { .. })
     }
 }
 

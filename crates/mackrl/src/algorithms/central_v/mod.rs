@@ -5,7 +5,13 @@ use mackrl_env::{
     settings::{Setting, Settings, SettingsError},
 };
 
-use crate::algorithms::{ActorCriticSettings, AlgorithmKind};
+use crate::{
+    Error,
+    algorithms::{ActorCritic, ActorCriticSettings, Algorithm, AlgorithmKind, Team},
+    common_knowledge::CommonKnowledgeFeatures,
+    hierarchy::{Hierarchy, HierarchySettings},
+    policy::Declaration,
+};
 
 /// The kind `central-v`. All its settings are those of [`ActorCriticSettings`].
 #[derive(Debug, Clone, Copy, Default)]
@@ -35,5 +41,17 @@ impl AlgorithmKind for CentralV {
     ) -> Result<toml::Table, SettingsError> {
         ActorCriticSettings::read(table)?.check()?;
         Ok(table.clone())
+    }
+
+    fn build(&self, table: &toml::Table, team: Team<'_>) -> Result<Box<dyn Algorithm>, Error> {
+        let settings = ActorCriticSettings::read(table).map_err(Error::setting)?;
+        let declaration = Declaration::agents_alone([team.spec.agents, team.spec.actions]);
+        let own = HierarchySettings {
+            // No group reads it.
+            common_knowledge: CommonKnowledgeFeatures::default(),
+            hidden: settings.hidden,
+        };
+        let hierarchy = Hierarchy::new(declaration, team.spec, team.prior, own);
+        Ok(Box::new(ActorCritic::new(hierarchy, settings, team)))
     }
 }

@@ -8,7 +8,11 @@ use mackrl_env::{
 };
 
 use crate::{
-    algorithms::{ActorCriticSettings, AlgorithmKind, Automatic, Preset},
+    Error,
+    algorithms::{
+        ActorCritic, ActorCriticSettings, Algorithm, AlgorithmKind, Automatic, Preset, Team,
+    },
+    hierarchy::{Hierarchy, HierarchySettings},
     partition::PartitionSchedule,
 };
 
@@ -92,6 +96,17 @@ impl AlgorithmKind for Mackrl {
                 nearest: None,
             })),
         }
+    }
+
+    fn build(&self, table: &toml::Table, team: Team<'_>) -> Result<Box<dyn Algorithm>, Error> {
+        let (settings, learning) = Self::read(table).map_err(Error::setting)?;
+        let declaration = settings.declaration([team.spec.agents, team.spec.actions], team.seed)?;
+        let own = HierarchySettings {
+            common_knowledge: settings.common_knowledge,
+            hidden: learning.hidden,
+        };
+        let hierarchy = Hierarchy::new(declaration, team.spec, team.prior, own);
+        Ok(Box::new(ActorCritic::new(hierarchy, learning, team)))
     }
 
     fn presets(&self) -> &'static [Preset] {

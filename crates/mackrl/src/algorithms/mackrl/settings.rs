@@ -6,9 +6,10 @@ use mackrl_env::{declare_settings, settings::Accepts};
 use serde::{Deserialize, Serialize};
 
 use crate::{
+    Error,
     common_knowledge::CommonKnowledgeFeatures,
-    hierarchy::{Delegation, HierarchySettings, Selection},
     partition::{PartitionSchedule, partition_count},
+    policy::{Declaration, Delegation, Selection},
 };
 
 declare_settings! {
@@ -27,16 +28,13 @@ declare_settings! {
 }
 
 impl MackrlSettings {
-    /// The hierarchy with controllers of so many hidden units.
-    #[must_use]
-    pub fn hierarchy(&self, hidden: usize) -> HierarchySettings {
-        HierarchySettings {
-            common_knowledge: self.common_knowledge,
-            partitions: self.partitions.into(),
-            selector: self.selector,
-            delegation: self.delegation,
-            hidden,
-        }
+    /// The hierarchy of a team of N agents with A actions each; sampled partitions are drawn from `seed`.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if the team is too large for the partitions.
+    pub fn declaration(&self, team: [usize; 2], seed: u64) -> Result<Declaration, Error> {
+        let schedule = self.partitions.into();
+        Declaration::pairwise(team, schedule, self.selector, self.delegation, seed)
     }
 }
 

@@ -26,11 +26,11 @@ fn row_results(
     let mut results = Vec::new();
     for t in 0..STEPS {
         trace.begin_step(rows, None);
-        for (row, input) in trace.input_mut().chunks_exact_mut(sizes.inputs).enumerate() {
-            let seed = if row == position { 0 } else { 1 + row };
-            input.copy_from_slice(&numbers::<f32>(sizes.inputs, 1000 * t + seed));
-        }
-        network.step(&weights, &mut trace);
+        let seeds = (0..rows).map(|row| if row == position { 0 } else { 1 + row });
+        let x: Vec<f32> = seeds
+            .flat_map(|seed| numbers::<f32>(sizes.inputs, 1000 * t + seed))
+            .collect();
+        network.step(&weights, &x, &mut trace);
         let mask: Vec<bool> = (0..rows * sizes.outputs)
             .map(|place| (place % sizes.outputs) % 5 != 2)
             .collect();
@@ -90,13 +90,9 @@ fn rows_that_leave_change_nothing_for_those_that_stay() {
     let logits = |carry: Option<&[usize]>, watched: usize, rows: usize| {
         let mut trace = Trace::new(SIZES, Retention::Episode);
         trace.begin_step(5, None);
-        trace
-            .input_mut()
-            .copy_from_slice(&numbers(5 * SIZES.inputs, 0));
-        network.step(&weights, &mut trace);
+        network.step(&weights, &numbers(5 * SIZES.inputs, 0), &mut trace);
         trace.begin_step(rows, carry);
-        trace.input_mut().fill(0.5);
-        network.step(&weights, &mut trace);
+        network.step(&weights, &vec![0.5; rows * SIZES.inputs], &mut trace);
         trace.logits(1)[watched * SIZES.outputs..][..SIZES.outputs].to_vec()
     };
     let stays = logits(None, 3, 5);
@@ -113,16 +109,15 @@ fn f32_equals_f64_up_to_rounding() {
     let weights64 = network32.weights(&parameters);
     let mut trace32 = Trace::<f32>::new(sizes, Retention::Episode);
     let mut trace64 = Trace::<f64>::new(sizes, Retention::Episode);
+    let (mut inputs32, mut inputs64) = (Vec::new(), Vec::new());
     for t in 0..steps {
-        let input = numbers::<f32>(rows * sizes.inputs, t);
+        let size = rows * sizes.inputs;
+        inputs32.extend(numbers::<f32>(size, t));
+        inputs64.extend(inputs32[t * size..].iter().map(|&x| f64::from(x)));
         trace32.begin_step(rows, None);
-        trace32.input_mut().copy_from_slice(&input);
-        network32.step(&weights32, &mut trace32);
+        network32.step(&weights32, &inputs32[t * size..], &mut trace32);
         trace64.begin_step(rows, None);
-        for (to, &from) in trace64.input_mut().iter_mut().zip(&input) {
-            *to = f64::from(from);
-        }
-        network32.step(&weights64, &mut trace64);
+        network32.step(&weights64, &inputs64[t * size..], &mut trace64);
         for (&single, &double) in trace32.logits(t).iter().zip(trace64.logits(t)) {
             assert!(
                 (f64::from(single) - double).abs() < 2e-6,
@@ -139,8 +134,8 @@ fn f32_equals_f64_up_to_rounding() {
     }
     let mut gradient32 = vec![0.0_f32; parameters.len()];
     let mut gradient64 = vec![0.0_f64; parameters.len()];
-    network32.backward(&weights32, &mut trace32, &mut gradient32);
-    network32.backward(&weights64, &mut trace64, &mut gradient64);
+    network32.backward(&weights32, &inputs32, &mut trace32, &mut gradient32);
+    network32.backward(&weights64, &inputs64, &mut trace64, &mut gradient64);
     let largest = gradient64
         .iter()
         .fold(0.0_f64, |largest, g| largest.max(g.abs()));

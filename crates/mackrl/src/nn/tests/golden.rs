@@ -57,8 +57,7 @@ fn check_network<E: Element>(tolerance: f64) {
     for t in 0..STEPS {
         trace.begin_step(ROWS, None);
         let input = &inputs[t * ROWS * SIZES.inputs..][..ROWS * SIZES.inputs];
-        trace.input_mut().copy_from_slice(input);
-        network.step(&weights, &mut trace);
+        network.step(&weights, input, &mut trace);
         hidden.extend_from_slice(trace.hidden(t));
         logits.extend_from_slice(trace.logits(t));
     }

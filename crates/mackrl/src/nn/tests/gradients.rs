@@ -34,6 +34,17 @@ fn check(gradient: &[f64], point: &[f64], mut loss: impl FnMut(&[f64]) -> f64) {
     }
 }
 
+/// The inputs of step `t`.
+fn inputs(rows: usize, t: usize) -> Vec<f64> {
+    numbers(rows * SIZES.inputs, t)
+}
+
+/// The inputs of all steps.
+fn all_inputs(episode: &[(usize, Option<Vec<usize>>)]) -> Vec<f64> {
+    let steps = episode.iter().enumerate();
+    steps.flat_map(|(t, (rows, _))| inputs(*rows, t)).collect()
+}
+
 /// Runs an episode and returns Σ coefficient · logit over all steps.
 fn run_episode(
     network: &RecurrentNetwork,
@@ -46,10 +57,7 @@ fn run_episode(
     let mut loss = 0.0;
     for (t, (rows, carry)) in episode.iter().enumerate() {
         trace.begin_step(*rows, carry.as_deref());
-        trace
-            .input_mut()
-            .copy_from_slice(&numbers::<f64>(rows * SIZES.inputs, t));
-        network.step(&weights, trace);
+        network.step(&weights, &inputs(*rows, t), trace);
         let coefficients = numbers::<f64>(rows * SIZES.outputs, 100 + t);
         loss += trace
             .last_logits()
@@ -70,7 +78,7 @@ fn check_episode(episode: &[(usize, Option<Vec<usize>>)]) {
         trace.logits_gradient_mut(t).copy_from_slice(&coefficients);
     }
     let mut gradient = vec![0.0; parameters.len()];
-    network.backward(&weights, &mut trace, &mut gradient);
+    network.backward(&weights, &all_inputs(episode), &mut trace, &mut gradient);
     check(&gradient, &parameters, |parameters| {
         run_episode(&network, parameters, episode, &mut trace)
     });
@@ -107,6 +115,19 @@ fn network_gradient_is_right_over_several_blocks_of_steps() {
 }
 
 #[test]
+#[should_panic(expected = "activations can be differentiated once")]
+fn used_up_activations_are_not_differentiated_again() {
+    let (network, parameters, weights) = network::<f64>(SIZES);
+    let mut trace = Trace::new(SIZES, Retention::Episode);
+    run_episode(&network, &parameters, &[(3, None)], &mut trace);
+    trace.logits_gradient_mut(0).fill(1.0);
+    let mut gradient = vec![0.0; parameters.len()];
+    for _ in 0..2 {
+        network.backward(&weights, &inputs(3, 0), &mut trace, &mut gradient);
+    }
+}
+
+#[test]
 fn gradients_add_to_what_is_there() {
     let (network, parameters, weights) = network::<f64>(SIZES);
     let mut trace = Trace::new(SIZES, Retention::Episode);
@@ -114,7 +135,7 @@ fn gradients_add_to_what_is_there() {
         run_episode(&network, &parameters, &[(3, None)], &mut trace);
         trace.logits_gradient_mut(0).fill(1.0);
         let mut gradient = vec![start; parameters.len()];
-        network.backward(&weights, &mut trace, &mut gradient);
+        network.backward(&weights, &inputs(3, 0), &mut trace, &mut gradient);
         gradient
     };
     for (more, less) in gradient_from(1.0).iter().zip(gradient_from(0.0)) {

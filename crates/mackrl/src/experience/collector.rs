@@ -1,63 +1,47 @@
-//! Episodes of parallel environments, stored once for the learner.
-//!
-//! Work is cut into shards whose number depends on the number of environments alone, never on the number of threads.
-//! Shards share nothing that is written, and whatever is summed over them is summed in their order, so a run gives the
-//! same bytes on one thread and on eight.
-
-mod episode;
-mod shard;
+//! Episodes of parallel environments, played shard by shard.
 
 use std::sync::{Arc, atomic::AtomicBool};
 
 use mackrl_env::{Environment, EpisodeKey};
 
-pub use episode::Episode;
-pub use shard::{Shard, ShardBatch};
-
+use super::{Piece, PlaySettings, Shard};
 use crate::{
     Error, Stopwatch,
     parallel::for_each_in_parallel,
-    policy::{Behaviour, Policy, Recording, Tally, Weights},
+    policy::{Parameters, Policy, Tally},
 };
-
-/// How a batch of episodes is played.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RolloutSettings {
-    /// How choices are made.
-    pub behaviour: Behaviour,
-    /// Whether the episodes will be learnt from.
-    pub recording: Recording,
-}
 
 /// B environments, cut into shards.
 #[derive(Debug)]
-pub struct Rollout {
+pub struct Collector {
     shards: Vec<Shard>,
     threads: usize,
 }
 
-impl Rollout {
-    /// Cuts `environments` into shards of at most `shard_size` and gives each an actor of `policy`. The shards are worked
-    /// on by up to `threads` threads, which does not change any result.
-    ///
-    /// # Panics
-    /// If `shard_size` is 0.
+impl Collector {
+    /// Cuts `environments` into `shards` shards, the first of which may have one environment more than the others, and gives
+    /// each an actor of `policy`. The shards are worked on by up to `threads` threads, which does not change any result; their
+    /// number does, because gradients are summed shard by shard. There are never more shards than environments.
     #[must_use]
     pub fn new(
         policy: &dyn Policy,
         environments: Vec<Box<dyn Environment>>,
-        shard_size: usize,
+        shards: usize,
         threads: usize,
     ) -> Self {
-        assert!(shard_size > 0, "a shard has at least one environment");
-        let mut shards = Vec::new();
-        let mut rest = environments.into_iter().peekable();
-        while rest.peek().is_some() {
-            let environments: Vec<_> = rest.by_ref().take(shard_size).collect();
+        let count = shards.clamp(1, environments.len().max(1));
+        let (size, larger) = (environments.len() / count, environments.len() % count);
+        let mut rest = environments.into_iter();
+        let shards = (0..count).map(|shard| {
+            let size = size + usize::from(shard < larger);
+            let environments: Vec<_> = rest.by_ref().take(size).collect();
             let actor = policy.actor(environments.len());
-            shards.push(Shard::new(environments, actor));
+            Shard::new(environments, actor)
+        });
+        Self {
+            shards: shards.collect(),
+            threads,
         }
-        Self { shards, threads }
     }
 
     /// Gives up playing, between two steps, as soon as `stop` is set.
@@ -82,9 +66,9 @@ impl Rollout {
     /// If there are more keys than environments.
     pub fn play(
         &mut self,
-        weights: &Weights,
+        parameters: &Parameters,
         keys: &[EpisodeKey],
-        settings: RolloutSettings,
+        settings: PlaySettings,
     ) -> Result<(), Error> {
         assert!(
             keys.len() <= self.environments(),
@@ -101,7 +85,7 @@ impl Rollout {
             })
             .collect();
         for_each_in_parallel(self.threads, &mut work, |(shard, keys, result)| {
-            *result = shard.play(weights, keys, settings);
+            *result = shard.play(parameters, keys, settings);
         });
         let mut before = 0;
         for (_, keys, result) in work {
@@ -120,21 +104,21 @@ impl Rollout {
         self.shards.iter().map(Shard::discarded).sum()
     }
 
-    /// The latest episodes, shard by shard, with the actors that played them.
-    pub fn batches(&mut self) -> impl Iterator<Item = &mut ShardBatch> {
-        self.shards.iter_mut().map(Shard::batch)
+    /// The latest experience, shard by shard, with the actors that left it.
+    pub fn pieces(&mut self) -> impl Iterator<Item = &mut Piece> {
+        self.shards.iter_mut().map(Shard::piece)
     }
 
     /// What measures the shards' time, each shard's alone.
     pub fn stopwatches(&mut self) -> impl Iterator<Item = &mut Stopwatch> {
-        self.batches().map(|batch| batch.actor.stopwatch())
+        self.pieces().map(|piece| piece.actor.stopwatch())
     }
 
     /// What the actors saw in the latest episodes.
     pub fn tally(&mut self) -> Tally {
         let mut tally = Tally::default();
-        self.batches()
-            .for_each(|batch| batch.actor.report(&mut tally));
+        self.pieces()
+            .for_each(|piece| piece.actor.report(&mut tally));
         tally
     }
 }

@@ -1,4 +1,4 @@
-//! The TD(λ) returns that the critic learns from (Sutton and Barto; the paper uses λ = 0.8).
+//! Returns and advantages along an episode: TD(λ) (Sutton and Barto; the paper's critic uses λ = 0.8) and GAE.
 
 use crate::Real;
 
@@ -41,6 +41,38 @@ pub fn lambda_returns<F: Real>(
     for t in (0..steps).rev() {
         next_return = reward_t[t] + one_step * value_t[t + 1] + traced * next_return;
         return_t[t] = next_return;
+    }
+}
+
+/// Writes the generalised advantage estimate of every step of one episode (Schulman and others, 2016).
+///
+/// # Shapes
+/// As [`lambda_returns`]: `reward_t` and `advantage_t` \[T\], `value_t` \[T + 1\].
+///
+/// # Equation
+/// `δ_t = r_t + γ V(s_{t+1}) − V(s_t)`, `A_t = δ_t + γ λ A_{t+1}` for t in 0..T, with `A_T = 0`.
+///
+/// # Panics
+/// If the lengths do not fit each other.
+pub fn generalised_advantages<F: Real>(
+    settings: ReturnSettings,
+    reward_t: &[F],
+    value_t: &[F],
+    advantage_t: &mut [F],
+) {
+    let steps = reward_t.len();
+    assert_eq!(
+        value_t.len(),
+        steps + 1,
+        "a value for every state, the last included"
+    );
+    assert_eq!(advantage_t.len(), steps, "an advantage for every step");
+    let gamma = F::from_f64(settings.gamma);
+    let traced = F::from_f64(settings.gamma * settings.lambda);
+    let mut next = F::ZERO;
+    for t in (0..steps).rev() {
+        next = reward_t[t] + gamma * value_t[t + 1] - value_t[t] + traced * next;
+        advantage_t[t] = next;
     }
 }
 
@@ -102,6 +134,23 @@ mod tests {
                 (return_ - mixture).abs() < 1e-12,
                 "step {t}: {return_} is not {mixture}"
             );
+        }
+    }
+
+    /// `A_t = G_t − V(s_t)`, whatever λ is.
+    #[test]
+    fn generalised_advantages_are_returns_less_values() {
+        for lambda in [0.0, 0.4, 1.0] {
+            let settings = ReturnSettings { gamma: 0.9, lambda };
+            let mut advantage_t = [0.0; 3];
+            generalised_advantages(settings, &REWARD_T, &VALUE_T, &mut advantage_t);
+            for (t, return_) in returns(0.9, lambda).into_iter().enumerate() {
+                let expected = return_ - VALUE_T[t];
+                assert!(
+                    (advantage_t[t] - expected).abs() < 1e-12,
+                    "step {t}, λ {lambda}"
+                );
+            }
         }
     }
 }

@@ -2,15 +2,14 @@
 
 use mackrl_env::EpisodeKey;
 
-use super::{ReturnSettings, lambda_returns};
 use crate::{
     NotFinite,
+    experience::Episode,
     nn::{
-        BrokenStep, FeedForward, FeedForwardTrace, FeedForwardWeights, Moments, Named,
-        NetworkSizes, Optimiser, OptimiserKind, ParameterLayout, Stepped, clip_gradient_norm,
-        first_not_finite,
+        FeedForward, FeedForwardTrace, FeedForwardWeights, Moments, NetworkSizes, Optimiser,
+        OptimiserKind, ParameterLayout, finite_step,
     },
-    rollout::Episode,
+    objectives::{ReturnSettings, lambda_returns},
 };
 
 /// How the critic learns.
@@ -75,10 +74,6 @@ pub struct CentralCritic {
     trace: FeedForwardTrace<f32>,
     updates: u64,
     updates_at_refresh: u64,
-    /// The state before the latest sweep.
-    before: CriticState,
-    /// What the latest sweep keeps of each episode.
-    sweeps: Vec<Sweep>,
 }
 
 /// What the sweep keeps of one episode.
@@ -111,13 +106,6 @@ impl CentralCritic {
             weights: network.weights(&parameters),
             target_parameters: parameters.clone(),
             target_weights: network.weights(&parameters),
-            before: CriticState {
-                parameters: parameters.clone(),
-                target_parameters: parameters.clone(),
-                moments: optimiser.moments().clone(),
-                updates: 0,
-                updates_at_refresh: 0,
-            },
             optimiser,
             gradient: vec![0.0; parameters.len()],
             trace: FeedForwardTrace::new(sizes),
@@ -126,7 +114,6 @@ impl CentralCritic {
             parameters,
             updates: 0,
             updates_at_refresh: 0,
-            sweeps: Vec::new(),
         }
     }
 
@@ -140,6 +127,25 @@ impl CentralCritic {
     #[must_use]
     pub fn parameters(&self) -> &[f32] {
         &self.parameters
+    }
+
+    /// Takes other parameters, to be asked for values.
+    ///
+    /// # Panics
+    /// If there are not as many as the layout says.
+    pub fn load(&mut self, parameters: &[f32]) {
+        self.network.refresh(parameters, &mut self.weights);
+        self.parameters.copy_from_slice(parameters);
+    }
+
+    /// V(s) of the state \[G\].
+    ///
+    /// # Panics
+    /// If the state has another size.
+    pub fn value(&mut self, state_g: &[f32]) -> f32 {
+        self.trace.begin(1).copy_from_slice(state_g);
+        self.network.forward(&self.weights, &mut self.trace);
+        self.trace.outputs()[0]
     }
 
     /// What a checkpoint must hold.
@@ -182,42 +188,16 @@ impl CentralCritic {
     /// `A_t = r_t + γ V(s_{t+1}) − V(s_t)`, with V = 0 after the end (eq. 6).
     ///
     /// # Errors
-    /// [`NotFinite`] if a value, a λ-return, a gradient, or a number after a step is not finite; the critic is then as it was
-    /// before the sweep.
+    /// [`NotFinite`] if a value, a λ-return, a gradient, or a number after a step is not finite; the critic has taken the steps
+    /// before then.
     pub fn sweep(
         &mut self,
         episodes: &[&Episode],
         advantage_bt: &mut Vec<Vec<f32>>,
     ) -> Result<CriticReport, NotFinite> {
-        self.save();
-        let mut sweeps = std::mem::take(&mut self.sweeps);
-        let swept = self.sweep_back(episodes, &mut sweeps);
-        advantage_bt.clear();
-        advantage_bt.extend(
-            sweeps
-                .iter_mut()
-                .map(|sweep| std::mem::take(&mut sweep.advantage_t)),
-        );
-        self.sweeps = sweeps;
-        if swept.is_err() {
-            self.undo();
-        }
-        swept
-    }
-
-    /// Becomes again as it was before the latest sweep.
-    pub fn undo(&mut self) {
-        self.restore(self.before.clone());
-    }
-
-    fn sweep_back(
-        &mut self,
-        episodes: &[&Episode],
-        sweeps: &mut Vec<Sweep>,
-    ) -> Result<CriticReport, NotFinite> {
         self.refresh_target_if_due();
-        sweeps.clear();
-        sweeps.extend(episodes.iter().map(|episode| self.prepare_sweep(episode)));
+        let prepared = episodes.iter().map(|episode| self.prepare_sweep(episode));
+        let mut sweeps: Vec<Sweep> = prepared.collect();
         let longest = episodes
             .iter()
             .map(|episode| episode.steps())
@@ -225,55 +205,15 @@ impl CentralCritic {
             .unwrap_or(0);
         let mut total = CriticReport::default();
         for t in (0..longest).rev() {
-            let report = self.update(t, episodes, sweeps)?;
+            let report = self.update(t, episodes, &mut sweeps)?;
             total.loss += report.loss / longest as f64;
             total.gradient_norm += report.gradient_norm / longest as f64;
             total.td_error_abs += report.td_error_abs / longest as f64;
             total.target_mean += report.target_mean / longest as f64;
         }
+        advantage_bt.clear();
+        advantage_bt.extend(sweeps.into_iter().map(|sweep| sweep.advantage_t));
         Ok(total)
-    }
-
-    /// The λ-returns of the latest sweep, one list for each episode.
-    #[must_use]
-    pub fn returns(&self) -> Vec<Named<'_, f32>> {
-        let returns = self.sweeps.iter().map(|sweep| &sweep.return_t[..]);
-        returns
-            .map(|return_t| Named::new("critic λ-returns", ["step", ""], 1, return_t))
-            .collect()
-    }
-
-    /// What the latest sweep computed for the last time step that it came to, in that order; a row is an episode.
-    #[must_use]
-    pub fn activations(&self) -> Vec<Named<'_, f32>> {
-        self.trace.named("critic")
-    }
-
-    /// The latest gradient, and the state after the latest step, tensor by tensor.
-    #[must_use]
-    pub fn step_numbers(&self) -> Vec<Named<'_, f32>> {
-        let mut named = self.layout.named("gradient of ", &self.gradient);
-        named.extend(named_step(&self.layout, &self.optimiser, &self.parameters));
-        named
-    }
-
-    /// Remembers the present state, without allocating.
-    fn save(&mut self) {
-        let Moments {
-            steps,
-            first,
-            second,
-        } = self.optimiser.moments();
-        let before = &mut self.before;
-        before.parameters.copy_from_slice(&self.parameters);
-        before
-            .target_parameters
-            .copy_from_slice(&self.target_parameters);
-        before.moments.steps = *steps;
-        before.moments.first.copy_from_slice(first);
-        before.moments.second.copy_from_slice(second);
-        before.updates = self.updates;
-        before.updates_at_refresh = self.updates_at_refresh;
     }
 
     fn refresh_target_if_due(&mut self) {
@@ -354,30 +294,16 @@ impl CentralCritic {
         self.gradient.fill(0.0);
         self.network
             .backward(&self.weights, &mut self.trace, &mut self.gradient);
-        report.gradient_norm =
-            clip_gradient_norm(&mut self.gradient, self.settings.gradient_norm_max);
-        self.step(report.gradient_norm)?;
+        report.gradient_norm = finite_step(
+            &mut self.optimiser,
+            &self.layout,
+            [self.settings.learning_rate, self.settings.gradient_norm_max],
+            &mut self.gradient,
+            &mut self.parameters,
+        )?;
         self.network.refresh(&self.parameters, &mut self.weights);
         self.updates += 1;
         Ok(report)
-    }
-
-    /// Takes one step of the optimiser, if the gradient, of this norm, and everything after the step are finite.
-    fn step(&mut self, gradient_norm: f64) -> Result<(), NotFinite> {
-        let Self {
-            optimiser,
-            settings,
-            layout,
-            gradient,
-            parameters,
-            ..
-        } = self;
-        check_gradient(gradient_norm, layout, gradient)?;
-        optimiser
-            .propose(settings.learning_rate, gradient, parameters)
-            .map_err(|broken| broken_step(broken, layout, optimiser))?;
-        optimiser.accept(parameters);
-        Ok(())
     }
 
     /// The value or the λ-return that makes an error at time `t` infinite or NaN.
@@ -397,50 +323,6 @@ impl CentralCritic {
         rows.find_map(|(row, &b)| of(row, b))
             .expect("a sum that is not finite has such a term")
     }
-}
-
-/// The state after an optimiser's latest step, accepted or not, tensor by tensor.
-pub(crate) fn named_step<'a>(
-    layout: &ParameterLayout,
-    optimiser: &'a Optimiser<f32>,
-    parameters: &'a [f32],
-) -> Vec<Named<'a, f32>> {
-    let (moments, parameters) = optimiser.latest(parameters);
-    let mut named = Vec::new();
-    if !moments.first.is_empty() {
-        named.extend(layout.named("first moment of ", &moments.first));
-    }
-    named.extend(layout.named("second moment of ", &moments.second));
-    named.extend(layout.named("after the step, ", parameters));
-    named
-}
-
-/// Refuses a gradient that is not finite. Its norm, a sum of squares in double precision, is finite only if all of it is.
-pub(crate) fn check_gradient(
-    norm: f64,
-    layout: &ParameterLayout,
-    gradient: &[f32],
-) -> Result<(), NotFinite> {
-    if norm.is_finite() {
-        return Ok(());
-    }
-    let index = first_not_finite(gradient).expect("a norm that is not finite has such a term");
-    Err(NotFinite::in_layout("gradient of", layout, index, gradient))
-}
-
-/// The number after a step for which the step is refused.
-pub(crate) fn broken_step(
-    broken: BrokenStep,
-    layout: &ParameterLayout,
-    optimiser: &Optimiser<f32>,
-) -> NotFinite {
-    let (moments, parameters) = optimiser.latest(&[]);
-    let (what, values) = match broken.what {
-        Stepped::FirstMoment => ("first moment of", moments.first.as_slice()),
-        Stepped::SecondMoment => ("second moment of", moments.second.as_slice()),
-        Stepped::Parameter => ("after the step,", parameters),
-    };
-    NotFinite::in_layout(what, layout, broken.index, values)
 }
 
 #[cfg(test)]

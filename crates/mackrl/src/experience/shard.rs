@@ -10,18 +10,21 @@ use std::{
 
 use mackrl_env::{Action, Environment, EpisodeKey, Observations, StepError};
 
-use super::{Episode, RolloutSettings};
+use super::{Experience, PlaySettings};
 use crate::{
     Error, NotFinite, Phase,
     nn::first_not_finite,
-    policy::{Actor, Situation, Weights},
+    policy::{Actor, Parameters, Recording, Situation},
 };
 
-/// A shard's episodes and the actor that still holds their activations: all that the learner sees.
-pub struct ShardBatch {
-    /// The episodes of the latest rollout, at most one per environment.
-    pub episodes: Vec<Episode>,
-    /// Who played them.
+/// Times that the same episodes are begun anew because a world fails under them, before the run gives up.
+pub(crate) const ATTEMPTS_MAX: usize = 100;
+
+/// A piece of a batch: the experience of one shard, and the actor that left it and may still hold activations of it.
+pub struct Piece {
+    /// The latest episodes, at most one per environment.
+    pub experience: Experience,
+    /// The actor that played them.
     pub actor: Box<dyn Actor>,
 }
 
@@ -31,7 +34,7 @@ pub struct Shard {
     observations: Observations,
     actions_bn: Vec<Action>,
     agents: usize,
-    batch: ShardBatch,
+    piece: Piece,
     /// Whether to give up: episodes of large teams last seconds.
     stop: Arc<AtomicBool>,
     /// Episodes that were played in vain.
@@ -56,8 +59,8 @@ impl Shard {
             environments,
             observations,
             agents,
-            batch: ShardBatch {
-                episodes: Vec::new(),
+            piece: Piece {
+                experience: Experience::default(),
                 actor,
             },
             stop: Arc::default(),
@@ -76,9 +79,9 @@ impl Shard {
         self.environments.len()
     }
 
-    /// The latest episodes and their actor.
-    pub const fn batch(&mut self) -> &mut ShardBatch {
-        &mut self.batch
+    /// The latest experience and its actor.
+    pub const fn piece(&mut self) -> &mut Piece {
+        &mut self.piece
     }
 
     /// Episodes so far that were played in vain because a world failed.
@@ -94,17 +97,21 @@ impl Shard {
     ///
     /// # Errors
     /// If an environment refuses an action, which means that the policy's masks disagree with it, or cannot be played in any
-    /// more, or if something that an environment or a controller gives is not finite; [`Error::Stopped`] if asked to
-    /// stop.
+    /// more (or fails a hundred times in a row), or if something that an environment or a controller gives is not finite;
+    /// [`Error::Stopped`] if asked to stop.
     pub fn play(
         &mut self,
-        weights: &Weights,
+        parameters: &Parameters,
         keys: &[EpisodeKey],
-        settings: RolloutSettings,
+        settings: PlaySettings,
     ) -> Result<(), Error> {
+        let mut attempts = 1;
         loop {
-            match self.attempt(weights, keys, settings) {
-                Err(Error::Step(StepError::Interrupted(failure))) if failure.can_be_repeated => {
+            match self.attempt(parameters, keys, settings) {
+                Err(Error::Step(StepError::Interrupted(failure)))
+                    if failure.can_be_repeated && attempts < ATTEMPTS_MAX =>
+                {
+                    attempts += 1;
                     self.discarded += keys.len() as u64;
                 }
                 outcome => return outcome,
@@ -114,22 +121,21 @@ impl Shard {
 
     fn attempt(
         &mut self,
-        weights: &Weights,
+        parameters: &Parameters,
         keys: &[EpisodeKey],
-        settings: RolloutSettings,
+        settings: PlaySettings,
     ) -> Result<(), Error> {
-        self.batch
-            .episodes
-            .resize_with(keys.len(), Episode::default);
-        self.batch.actor.begin(settings.recording);
-        self.batch.actor.stopwatch().skip();
+        let Piece { experience, actor } = &mut self.piece;
+        experience.begin(keys, settings.behaviour);
+        actor.begin(settings.recording, experience);
+        actor.stopwatch().skip();
         for (b, key) in keys.iter().enumerate() {
             self.environments[b].reset(*key, &mut self.observations.row_mut(b));
             check_finite(&self.observations, b, 0)?;
-            self.batch.episodes[b].clear();
-            self.batch.episodes[b].remember_state(settings.recording, &self.observations, b);
+            let episode = &mut experience.episodes[b];
+            episode.remember_state(settings.recording, &self.observations, b);
         }
-        self.batch.actor.stopwatch().lap(Phase::Simulate);
+        actor.stopwatch().lap(Phase::Simulate);
         let mut playing: Vec<usize> = (0..keys.len()).collect();
         for step in 0.. {
             if playing.is_empty() {
@@ -145,20 +151,19 @@ impl Shard {
                 observations: &self.observations,
                 behaviour: settings.behaviour,
             };
-            self.batch
-                .actor
-                .act(weights, situation, &mut self.actions_bn)?;
+            let Piece { experience, actor } = &mut self.piece;
+            actor.act(parameters, situation, experience, &mut self.actions_bn)?;
             for &b in &playing {
                 self.step(b, step, settings)?;
             }
-            self.batch.actor.stopwatch().lap(Phase::Simulate);
-            playing.retain(|&b| self.batch.episodes[b].end.is_none());
+            self.piece.actor.stopwatch().lap(Phase::Simulate);
+            playing.retain(|&b| self.piece.experience.episodes[b].end.is_none());
         }
         Ok(())
     }
 
     /// Plays the chosen actions of a step in environment `b`.
-    fn step(&mut self, b: usize, step: usize, settings: RolloutSettings) -> Result<(), Error> {
+    fn step(&mut self, b: usize, step: usize, settings: PlaySettings) -> Result<(), Error> {
         let actions = &self.actions_bn[b * self.agents..(b + 1) * self.agents];
         let time_step = self.environments[b].step(actions, &mut self.observations.row_mut(b))?;
         if !time_step.reward.is_finite() {
@@ -166,7 +171,10 @@ impl Shard {
             return Err(NotFinite::new("reward", &place, time_step.reward).into());
         }
         check_finite(&self.observations, b, step + 1)?;
-        let episode = &mut self.batch.episodes[b];
+        let episode = &mut self.piece.experience.episodes[b];
+        if settings.recording == Recording::ForLearning {
+            episode.action_tn.extend_from_slice(actions);
+        }
         episode.reward_t.push(time_step.reward);
         episode.end = time_step.end;
         episode.remember_state(settings.recording, &self.observations, b);
@@ -196,11 +204,11 @@ fn check_finite(observations: &Observations, b: usize, step: usize) -> Result<()
     Ok(())
 }
 
-impl fmt::Debug for ShardBatch {
+impl fmt::Debug for Piece {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter
-            .debug_struct("ShardBatch")
-            .field("episodes", &self.episodes)
+            .debug_struct("Piece")
+            .field("experience", &self.experience)
             .finish_non_exhaustive()
     }
 }
@@ -209,7 +217,7 @@ impl fmt::Debug for Shard {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter
             .debug_struct("Shard")
-            .field("batch", &self.batch)
+            .field("piece", &self.piece)
             .finish_non_exhaustive()
     }
 }

@@ -1,14 +1,21 @@
-//! What the learner needs of an episode, stored once.
+//! One episode of one environment.
 
-use mackrl_env::{EpisodeEnd, EpisodeStatistics, Observations};
+use mackrl_env::{Action, EntitySet, EpisodeEnd, EpisodeStatistics, Observations};
 
 use crate::policy::Recording;
 
-/// One episode of one environment, without the activations that the actor keeps.
+/// One episode of one environment: what was done, what it brought, and the states that a central critic may read.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Episode {
     /// States \[T + 1, G\]: before each step, and after the last; empty unless recorded for learning.
     pub state_tg: Vec<f32>,
+    /// Joint actions \[T, N\]; empty unless recorded for learning.
+    pub action_tn: Vec<Action>,
+    /// Agents that live before each step \[T\]; empty unless recorded for learning.
+    pub alive_t: Vec<EntitySet>,
+    /// log p(u) of the joint action under the policy that acted \[T\], over all ways to it (eq. 5); empty unless recorded for
+    /// learning.
+    pub log_p_t: Vec<f32>,
     /// Rewards \[T\].
     pub reward_t: Vec<f32>,
     /// Why the episode ended; `None` while it runs.
@@ -43,9 +50,19 @@ impl Episode {
         &self.state_tg[t * size..(t + 1) * size]
     }
 
+    /// The joint action \[N\] of step `t`.
+    #[must_use]
+    pub fn actions(&self, t: usize) -> &[Action] {
+        let agents = self.action_tn.len() / self.steps().max(1);
+        &self.action_tn[t * agents..(t + 1) * agents]
+    }
+
     /// Forgets everything but the memory.
     pub(super) fn clear(&mut self) {
         self.state_tg.clear();
+        self.action_tn.clear();
+        self.alive_t.clear();
+        self.log_p_t.clear();
         self.reward_t.clear();
         self.end = None;
         self.statistics = EpisodeStatistics::default();

@@ -6,9 +6,9 @@ use mackrl_env::{
 };
 
 use crate::{
-    central_critic::{CriticSettings, ReturnSettings},
-    learner::{LearnerSettings, LossAverage},
+    critics::CriticSettings,
     nn::OptimiserKind,
+    objectives::{LossAverage, ReturnSettings},
 };
 
 declare_words! {
@@ -71,34 +71,28 @@ declare_settings! {
 }
 
 impl ActorCriticSettings {
-    /// Environments in each shard; the last may have fewer.
+    /// How the critic learns.
     #[must_use]
-    pub const fn shard_size(&self) -> usize {
-        self.environments.div_ceil(self.shards)
+    pub fn critic(&self) -> CriticSettings {
+        CriticSettings {
+            hidden: self.hidden,
+            optimiser: self.optimiser.into(),
+            learning_rate: self.critic_learning_rate,
+            gradient_norm_max: self.gradient_norm_max,
+            returns: ReturnSettings {
+                gamma: self.gamma,
+                lambda: self.lambda,
+            },
+            target_interval_updates: self.target_interval_updates,
+            bootstrap_at_time_limit: self.bootstrap_at_time_limit,
+        }
     }
 
-    /// How the controllers and the critic learn.
+    /// ε of the bounded softmax after so many environment steps: it falls linearly.
     #[must_use]
-    pub fn learner(&self) -> LearnerSettings {
-        let optimiser = self.optimiser.into();
-        LearnerSettings {
-            optimiser,
-            learning_rate: self.learning_rate,
-            gradient_norm_max: self.gradient_norm_max,
-            average: self.loss_average,
-            critic: CriticSettings {
-                hidden: self.hidden,
-                optimiser,
-                learning_rate: self.critic_learning_rate,
-                gradient_norm_max: self.gradient_norm_max,
-                returns: ReturnSettings {
-                    gamma: self.gamma,
-                    lambda: self.lambda,
-                },
-                target_interval_updates: self.target_interval_updates,
-                bootstrap_at_time_limit: self.bootstrap_at_time_limit,
-            },
-        }
+    pub fn exploration(&self, steps_env: u64) -> f64 {
+        let progress = (steps_env as f64 / self.exploration_steps_env as f64).min(1.0);
+        self.exploration_start + (self.exploration_finish - self.exploration_start) * progress
     }
 
     /// Checks what the range of a single setting does not say: exploration falls.
@@ -138,13 +132,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn eight_environments_are_cut_in_two_unless_more_is_asked_for() {
-        let mut settings = ActorCriticSettings::default();
-        assert_eq!(settings.shard_size(), 4);
-        settings.shards = 3;
-        assert_eq!(settings.shard_size(), 3);
-        settings.shards = 100;
-        assert_eq!(settings.shard_size(), 1);
+    fn exploration_falls_linearly_and_then_stays() {
+        let settings = ActorCriticSettings::default();
+        for (steps, expected) in [(0, 0.5), (25_000, 0.255), (50_000, 0.01), (1_000_000, 0.01)] {
+            let found = settings.exploration(steps);
+            assert!((found - expected).abs() < 1e-12, "{steps}: {found}");
+        }
     }
 
     #[test]

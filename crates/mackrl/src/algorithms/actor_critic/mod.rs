@@ -1,0 +1,378 @@
+//! On-policy actor-critic learning from the marginal probability of the joint action (eq. 6), on any declared hierarchy.
+//!
+//! One update takes a batch of whole episodes: the critic sweeps backwards through time and yields advantages, then the policy
+//! takes one step along `Σ A_t ∇ log p(u_t)`. MACKRL and Central-V differ in their declaration alone.
+//!
+//! Every piece of a batch has a gradient of its own, and they are summed in the order of the pieces: the number of threads
+//! changes nothing.
+
+mod settings;
+
+use mackrl_env::{EpisodeKey, Stream};
+
+pub use settings::{ActorCriticSettings, OptimiserName};
+
+use super::{Algorithm, AlgorithmState, StoredState, Team, state::read_moments};
+use crate::{
+    Error, NotFinite, Phase, Real, Stopwatch,
+    critics::{CentralCritic, CriticReport, CriticState},
+    experience::{Episode, Piece},
+    hierarchy::Hierarchy,
+    nn::{Optimiser, ParameterLayout, finite_step, first_not_finite},
+    objectives::policy_gradient,
+    parallel::for_each_in_parallel,
+    policy::{Behaviour, Parameters, Policy, Tally},
+};
+
+/// What is reported.
+const METRICS: &[(&str, &str)] = &[
+    ("epsilon", "ε of the bounded softmax in the latest batch"),
+    (
+        "pg_loss",
+        "−mean of A_t log p(u_t), divided by the number of agents",
+    ),
+    (
+        "agent_grad_norm",
+        "norm of the policy's gradient before clipping",
+    ),
+    (
+        "advantage_mean",
+        "mean of A_t = r_t + γ V(s_{t+1}) − V(s_t)",
+    ),
+    (
+        "critic_loss",
+        "mean squared error of V to its λ-returns over a sweep",
+    ),
+    (
+        "critic_grad_norm",
+        "mean norm of the critic's gradients before clipping",
+    ),
+    ("td_error_abs", "mean |λ-return − V|"),
+    ("target_mean", "mean λ-return"),
+    (
+        "mackrl/delegation_rate",
+        "share of chosen pairs with common knowledge that delegated",
+    ),
+    (
+        "mackrl/delegation_rate_ck_enemies_",
+        "the same, for pairs that commonly know this many enemies (Figure 7)",
+    ),
+    (
+        "mackrl/common_knowledge_rate",
+        "share of chosen pairs of living agents with common knowledge",
+    ),
+    (
+        "mackrl/ck_entities_mean",
+        "entities that a chosen pair of living agents commonly knows",
+    ),
+    (
+        "mackrl/entropy_pair_selector",
+        "entropy of the pair selector, in nats",
+    ),
+    (
+        "mackrl/entropy_four_selector",
+        "entropy of the choice between divisions into fours, in nats",
+    ),
+    (
+        "mackrl/entropy_four_controller",
+        "entropy of chosen fours' choice between their partitions into pairs, in nats",
+    ),
+    (
+        "mackrl/entropy_pair_controller",
+        "entropy of chosen pair controllers with common knowledge, in nats",
+    ),
+    (
+        "mackrl/entropy_agent_controller",
+        "entropy of living agents' controllers, in nats",
+    ),
+];
+
+/// A team with a central critic.
+#[derive(Debug)]
+pub struct ActorCritic {
+    settings: ActorCriticSettings,
+    agents: usize,
+    threads: usize,
+    hierarchy: Hierarchy,
+    parameters: Parameters,
+    optimiser: Optimiser<f32>,
+    critic: CentralCritic,
+    gradients: Vec<Vec<f32>>,
+    advantage_bt: Vec<Vec<f32>>,
+    updates: u64,
+}
+
+/// One piece of a batch and its share of the gradient.
+struct Work<'a> {
+    piece: &'a mut Piece,
+    gradient: &'a mut Vec<f32>,
+    advantage_bt: &'a [Vec<f32>],
+    outcome: Result<f64, Error>,
+}
+
+impl ActorCritic {
+    /// A team that acts as `hierarchy` declares, with initial parameters drawn from the team's seed.
+    #[must_use]
+    pub fn new(hierarchy: Hierarchy, settings: ActorCriticSettings, team: Team<'_>) -> Self {
+        let parameters = hierarchy.initialise(team.seed);
+        let critic_key = EpisodeKey::new(team.seed, Stream::Other, 1);
+        Self {
+            agents: team.spec.agents,
+            threads: team.threads,
+            optimiser: Optimiser::new(settings.optimiser.into(), parameters.len()),
+            critic: CentralCritic::new(team.spec.state_size, settings.critic(), &critic_key),
+            parameters: Parameters::new(parameters),
+            hierarchy,
+            settings,
+            gradients: Vec::new(),
+            advantage_bt: Vec::new(),
+            updates: 0,
+        }
+    }
+
+    /// The critic.
+    #[must_use]
+    pub const fn critic(&self) -> &CentralCritic {
+        &self.critic
+    }
+
+    /// The policy's gradient of the latest batch, before clipping shortened it; empty before there was one.
+    #[must_use]
+    pub fn gradient(&self) -> &[f32] {
+        self.gradients.first().map_or(&[], Vec::as_slice)
+    }
+
+    /// Computes the gradient of the loss into the first piece's gradient and returns the loss.
+    ///
+    /// # Equation
+    /// `∇J = 1/N Σ_{b,t} w_{bt} A_{bt} ∇ log p(u_{bt})` (eq. 6): see [`policy_gradient`]; `w` are the weights of
+    /// [`LossAverage`](crate::objectives::LossAverage), `1 / Σ_b T_b` unless something else is asked for.
+    fn policy_step(&mut self, batch: &mut [&mut Piece]) -> Result<f64, Error> {
+        let steps_b: Vec<usize> = self.advantage_bt.iter().map(Vec::len).collect();
+        let weights = self.settings.loss_average.weight_t(&steps_b).into_iter();
+        let weight_t: Vec<f32> = weights.map(|weight| weight / self.agents as f32).collect();
+        let parameters = self.parameters.values().len();
+        self.gradients
+            .resize_with(batch.len(), || vec![0.0; parameters]);
+        let mut rest = self.advantage_bt.as_slice();
+        let pieces = batch.iter_mut().zip(&mut self.gradients);
+        let mut work: Vec<Work<'_>> = pieces
+            .map(|(piece, gradient)| {
+                let (own, others) = rest.split_at(piece.experience.episodes.len());
+                rest = others;
+                Work {
+                    piece,
+                    gradient,
+                    advantage_bt: own,
+                    outcome: Ok(0.0),
+                }
+            })
+            .collect();
+        let (hierarchy, parameters) = (&self.hierarchy, &self.parameters);
+        for_each_in_parallel(self.threads, &mut work, |work| {
+            work.outcome = work.differentiate(hierarchy, parameters, &weight_t);
+        });
+        let mut loss = 0.0;
+        for work in work {
+            loss += work.outcome?;
+        }
+        if let Some((first, others)) = self.gradients.split_first_mut() {
+            for other in others {
+                let terms = first.iter_mut().zip(&*other);
+                terms.for_each(|(sum, term)| *sum += term);
+            }
+        }
+        Ok(loss)
+    }
+}
+
+impl Work<'_> {
+    /// Writes the piece's gradient and gives its loss.
+    fn differentiate(
+        &mut self,
+        hierarchy: &Hierarchy,
+        parameters: &Parameters,
+        weight_t: &[f32],
+    ) -> Result<f64, Error> {
+        self.gradient.fill(0.0);
+        let (experience, activations) = hierarchy.evaluate(parameters, self.piece)?;
+        let mut d_log_p_bt = Vec::new();
+        let loss = policy_gradient(
+            activations.log_p_bt(),
+            self.advantage_bt,
+            weight_t,
+            &mut d_log_p_bt,
+        );
+        hierarchy.backward(
+            parameters,
+            experience,
+            activations,
+            &d_log_p_bt,
+            self.gradient,
+        );
+        Ok(loss)
+    }
+}
+
+impl Algorithm for ActorCritic {
+    fn policy(&self) -> &dyn Policy {
+        &self.hierarchy
+    }
+
+    fn parameters(&self) -> &Parameters {
+        &self.parameters
+    }
+
+    fn environments(&self) -> usize {
+        self.settings.environments
+    }
+
+    fn shards(&self) -> usize {
+        self.settings.shards
+    }
+
+    fn behaviour(&self, steps_env: u64) -> Behaviour {
+        Behaviour::sampled(self.settings.exploration(steps_env))
+    }
+
+    fn learn(
+        &mut self,
+        batch: &mut [&mut Piece],
+        stopwatch: &mut Stopwatch,
+    ) -> Result<Tally, Error> {
+        let episodes: Vec<&Episode> = batch
+            .iter()
+            .flat_map(|piece| &piece.experience.episodes)
+            .collect();
+        let steps: usize = episodes.iter().map(|episode| episode.steps()).sum();
+        if steps == 0 {
+            return Err(Error::Data("there is no step to learn from".to_owned()));
+        }
+        let critic = self.critic.sweep(&episodes, &mut self.advantage_bt)?;
+        check_advantages(&self.advantage_bt)?;
+        stopwatch.lap(Phase::Critic);
+        let exploration = batch
+            .first()
+            .map_or(0.0, |piece| piece.experience.exploration);
+        let loss = self.policy_step(batch)?;
+        stopwatch.lap(Phase::Backward);
+        if !loss.is_finite() {
+            let loss = Real::from_f64(loss);
+            return Err(NotFinite::new("sum of A log p(u)", &[], loss).into());
+        }
+        let rates = [self.settings.learning_rate, self.settings.gradient_norm_max];
+        let (optimiser, layout) = (&mut self.optimiser, self.hierarchy.layout());
+        let gradient = &mut self.gradients[0];
+        let step = |values: &mut Vec<f32>| finite_step(optimiser, layout, rates, gradient, values);
+        let norm = self.parameters.change(step)?;
+        self.updates += 1;
+        stopwatch.lap(Phase::Optimiser);
+        let advantages = self.advantage_bt.iter().flatten();
+        let advantage_mean = advantages.map(|&a| f64::from(a)).sum::<f64>() / steps as f64;
+        Ok(report(
+            f64::from(exploration),
+            [loss, norm, advantage_mean],
+            critic,
+        ))
+    }
+
+    fn updates(&self) -> u64 {
+        self.updates
+    }
+
+    fn metrics(&self) -> &'static [(&'static str, &'static str)] {
+        METRICS
+    }
+
+    fn models(&self) -> Vec<(&ParameterLayout, &[f32])> {
+        vec![
+            (self.hierarchy.layout(), self.parameters.values()),
+            (self.critic.layout(), self.critic.parameters()),
+        ]
+    }
+
+    fn state(&self) -> AlgorithmState {
+        let (layout, critic_layout) = (self.hierarchy.layout(), self.critic.layout());
+        let (kind, critic) = (self.settings.optimiser.into(), self.critic.state());
+        let mut state = AlgorithmState::default();
+        state.add_tensors(layout, self.parameters.values());
+        state.add_tensors(critic_layout, &critic.parameters);
+        state.add_tensors(
+            &critic_layout.prefixed("target."),
+            &critic.target_parameters,
+        );
+        state.add_moments("policy", kind, layout, self.optimiser.moments());
+        state.add_moments("critic", kind, critic_layout, &critic.moments);
+        state.add_counter("policy.updates", self.updates);
+        state.add_counter("critic.updates", critic.updates);
+        state.add_counter("critic.updates_at_refresh", critic.updates_at_refresh);
+        state
+    }
+
+    fn restore(&mut self, stored: &dyn StoredState) -> Result<(), Error> {
+        let (layout, critic_layout) = (self.hierarchy.layout(), self.critic.layout());
+        let kind = self.settings.optimiser.into();
+        let parameters = stored.tensors(layout)?;
+        let moments = read_moments(stored, "policy", kind, layout)?;
+        let updates = stored.counter("policy.updates")?;
+        let critic = CriticState {
+            parameters: stored.tensors(critic_layout)?,
+            target_parameters: stored.tensors(&critic_layout.prefixed("target."))?,
+            moments: read_moments(stored, "critic", kind, critic_layout)?,
+            updates: stored.counter("critic.updates")?,
+            updates_at_refresh: stored.counter("critic.updates_at_refresh")?,
+        };
+        if critic.updates_at_refresh > critic.updates {
+            return Err(Error::Data(format!(
+                "the target critic was refreshed after {} updates, expected at most {}",
+                critic.updates_at_refresh, critic.updates
+            )));
+        }
+        self.parameters = Parameters::new(parameters);
+        self.optimiser.restore(moments);
+        self.critic.restore(critic);
+        self.updates = updates;
+        Ok(())
+    }
+
+    fn load(&mut self, stored: &dyn StoredState) -> Result<(), Error> {
+        let parameters = stored.tensors(self.hierarchy.layout())?;
+        let critic = stored.tensors(self.critic.layout())?;
+        self.parameters = Parameters::new(parameters);
+        self.critic.load(&critic);
+        Ok(())
+    }
+
+    fn value(&mut self, state_g: &[f32]) -> Option<f32> {
+        Some(self.critic.value(state_g))
+    }
+}
+
+/// What an update did, under the names of [`METRICS`].
+fn report(exploration: f64, [loss, norm, advantage]: [f64; 3], critic: CriticReport) -> Tally {
+    let mut tally = Tally::default();
+    for (name, value) in [
+        ("epsilon", exploration),
+        ("pg_loss", loss),
+        ("agent_grad_norm", norm),
+        ("advantage_mean", advantage),
+        ("critic_loss", critic.loss),
+        ("critic_grad_norm", critic.gradient_norm),
+        ("td_error_abs", critic.td_error_abs),
+        ("target_mean", critic.target_mean),
+    ] {
+        tally.add(name, value, 1.0);
+    }
+    tally
+}
+
+/// Refuses advantages that are not finite.
+fn check_advantages(advantage_bt: &[Vec<f32>]) -> Result<(), NotFinite> {
+    for (b, advantage_t) in advantage_bt.iter().enumerate() {
+        if let Some(t) = first_not_finite(advantage_t) {
+            let place = [("episode", b), ("step", t)];
+            return Err(NotFinite::new("advantage", &place, advantage_t[t]));
+        }
+    }
+    Ok(())
+}

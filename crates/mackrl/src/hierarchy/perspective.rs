@@ -1,0 +1,62 @@
+//! Whose eyes the controllers look through: those of all agents, in the central run, or those of one agent alone.
+//!
+//! Both give the same bits for every group that the one agent belongs to; that is what common knowledge means, and what
+//! the certificate compares.
+
+use mackrl_env::{Action, AgentId, KnownEntities, LocalView, Observations, PriorKnowledge};
+
+use crate::common_knowledge::{common_knowledge, common_knowledge_from_view};
+
+/// What controllers may look at.
+#[derive(Clone, Copy)]
+pub(crate) enum Perspective<'a> {
+    /// The local views of all agents, of all environments.
+    Everybody(&'a Observations),
+    /// The local view of one agent, and what it knew before the game.
+    One(LocalView<'a>, &'a dyn PriorKnowledge),
+}
+
+impl<'a> Perspective<'a> {
+    /// The view of `agent` in environment `b`.
+    pub(crate) fn view(self, b: usize, agent: AgentId) -> LocalView<'a> {
+        match self {
+            Self::Everybody(observations) => observations.local_view(b, agent),
+            Self::One(view, _) => view,
+        }
+    }
+
+    /// Whether `agent` acts in environment `b`, as far as can be told. One agent alone does not always see whether another
+    /// lives; it goes on computing for groups whose other members are dead, which can only divide.
+    pub(crate) fn acts(self, b: usize, agent: AgentId) -> bool {
+        match self {
+            Self::Everybody(observations) => is_alive(observations.local_view(b, agent)),
+            Self::One(..) => true,
+        }
+    }
+
+    /// What `group` commonly knows in environment `b`.
+    pub(crate) fn common_knowledge(self, b: usize, group: &[AgentId]) -> KnownEntities<'a> {
+        match self {
+            Self::Everybody(observations) => {
+                let known = common_knowledge(group, observations.visible(b));
+                let member = observations.local_view(b, group[0]);
+                member.seen().restricted_to(known)
+            }
+            Self::One(view, prior) => {
+                let known = common_knowledge_from_view(group, view.seen(), prior);
+                view.seen().restricted_to(known)
+            }
+        }
+    }
+}
+
+/// Whether the agent still acts. The dead see nothing, not even themselves; their one available action needs no network.
+pub(crate) fn is_alive(view: LocalView<'_>) -> bool {
+    !view.seen().set().is_empty()
+}
+
+/// The only action of an agent that no longer acts.
+pub(crate) fn forced_action(view: LocalView<'_>) -> Action {
+    let first = view.available().iter().position(|&available| available);
+    Action::new(first.unwrap_or_default())
+}

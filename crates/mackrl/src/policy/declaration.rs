@@ -1,0 +1,572 @@
+//! The hierarchy as a declaration: levels of groups, and what each group may choose.
+//!
+//! Eq. (4) lets the controller of a group 𝒢 choose from `𝓤_𝒢 = 𝓤_env^𝒢 ∪ 𝓟(𝒢)`: a joint action of its members, or a division
+//! of 𝒢 into smaller groups that choose in turn. A [`Declaration`] says which groups there are, which of them act jointly and
+//! how each may divide; everything else (the walk, the marginal, one agent alone, explanations) follows it. Groups of one
+//! level share a network. A group divides into groups of *later* levels only, so level after level is an order from the root
+//! to the leaves.
+//!
+//! Table 1 of the paper is [`Declaration::pairwise`]. Writing that one into the code instead, as three named controllers,
+//! is shorter, and every other hierarchy is then a fork.
+
+use mackrl_env::{Action, AgentId, Draw, EpisodeKey, declare_words};
+
+use crate::{
+    Error,
+    partition::{
+        Pair, Pairs, Partition, PartitionBuffer, PartitionSchedule, Partitions, ways_to_divide,
+    },
+};
+
+/// The level of the whole team: one group, the root.
+pub const TEAM: usize = 0;
+/// Most levels of a declaration.
+pub const LEVELS_MAX: usize = 4;
+
+declare_words! {
+    /// How a group chooses between its divisions; anything but [`Selection::Learned`] is an ablation.
+    pub enum Selection {
+        /// A controller decides.
+        #[default]
+        Learned = "learned",
+        /// Each division in force is as likely as any other, in greedy play too: a draw that all members share, and no choice.
+        Uniform = "uniform",
+    }
+}
+
+declare_words! {
+    /// When a group that could act jointly may divide instead; anything but [`Delegation::Learned`] is an ablation.
+    pub enum Delegation {
+        /// Its controller decides.
+        #[default]
+        Learned = "learned",
+        /// Always: the team is as good as independent agents with a central critic.
+        Always = "always",
+        /// Only where the group commonly knows no joint action.
+        Never = "never",
+    }
+}
+
+/// What the controllers of a level read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reads {
+    /// What the group commonly knows.
+    CommonKnowledge,
+    /// What the group commonly knows, and who its members are.
+    CommonKnowledgeAndMembers,
+    /// Of a group of one: its own observation, who it is, and its last action.
+    OwnObservation,
+}
+
+/// A group of a later level.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Part {
+    /// Its level.
+    pub level: usize,
+    /// Its number within the level.
+    pub group: usize,
+}
+
+/// One way to divide a group: disjoint groups that together are the group.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Division {
+    /// The groups that it divides into.
+    pub parts: Vec<Part>,
+}
+
+/// Groups whose controllers share a network.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Level {
+    /// What its controllers are called, in files too: `pair_controller`.
+    pub name: &'static str,
+    /// Members of each group, ascending \[G\]\[members\]; all groups of a level have as many.
+    pub groups: Vec<Vec<AgentId>>,
+    /// The ways in which each group may divide \[G\]\[D\]; D is the same for all. Those of the team may change from step to
+    /// step instead and are not listed here then.
+    pub divisions_gd: Vec<Vec<Division>>,
+    /// D: how many divisions a group chooses from at a step.
+    pub divisions: usize,
+    /// Whether a group may act jointly, and when it must.
+    pub acts: Option<Delegation>,
+    /// How it chooses. A group with one choice needs no network.
+    pub selection: Selection,
+    /// What it reads.
+    pub reads: Reads,
+    /// Whether exploration is mixed into its choices.
+    pub explores: bool,
+    /// Groups that some division of an earlier level contains, ascending.
+    pub active: Vec<usize>,
+}
+
+/// Levels of groups: who may divide, who may act jointly, who acts alone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Declaration {
+    agents: usize,
+    actions: usize,
+    levels: Vec<Level>,
+    /// The team's divisions where they change from step to step.
+    rounds: Option<Partitions>,
+    is_pairwise: bool,
+}
+
+/// Room for divisions that change from step to step; reused, it makes [`Declaration::in_force`] free of allocation.
+#[derive(Debug, Clone, Default)]
+pub struct DivisionBuffer {
+    partitions: PartitionBuffer,
+    division: Division,
+}
+
+impl Level {
+    /// Members of each group.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.groups.first().map_or(0, Vec::len)
+    }
+
+    /// C: columns of a group's row, the divisions first and then the joint actions, A to the power of its size.
+    #[must_use]
+    pub fn columns(&self, actions: usize) -> usize {
+        self.divisions + self.joint_actions(actions)
+    }
+
+    /// The column of the joint action that is `action_of` each member, if the group may act jointly:
+    /// `D + (…(u_1·A + u_2)·A + …)`.
+    #[must_use]
+    pub fn column(&self, group: usize, actions: usize, action_n: &[Action]) -> Option<usize> {
+        self.acts?;
+        let members = self.groups[group].iter();
+        let joint = members.fold(0, |joint, member| {
+            joint * actions + action_n[member.index()].index()
+        });
+        Some(self.divisions + joint)
+    }
+
+    /// Whether a network decides.
+    #[must_use]
+    pub fn is_learned(&self) -> bool {
+        self.selection == Selection::Learned
+            && !self.groups.is_empty()
+            && (self.acts.is_some() || self.divisions > 1)
+    }
+
+    /// Whether a group with a dead member has no choice left: it knows nothing in common and divides in one way, or it is the
+    /// dead agent.
+    #[must_use]
+    pub const fn is_forced_by_death(&self) -> bool {
+        self.divisions <= 1
+    }
+
+    /// The name of the random number that decides for `group`.
+    pub(crate) fn draw(&self, level: usize, group: usize) -> Draw {
+        match (level, self.size()) {
+            (TEAM, _) => Draw::Selector,
+            (_, 1) => Draw::Agent(group),
+            (_, 2) => Draw::Pair(group),
+            (level, _) => Draw::Group(level, group),
+        }
+    }
+
+    fn joint_actions(&self, actions: usize) -> usize {
+        match self.acts {
+            // Sizes are at most 2 where groups act jointly.
+            Some(_) => (0..self.size()).fold(1, |product, _| product * actions),
+            None => 0,
+        }
+    }
+}
+
+impl Declaration {
+    /// Pairwise MACKRL (Table 1): the team divides into pairs, a pair acts jointly or divides into its members.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if the team is too large for the schedule of partitions.
+    pub fn pairwise(
+        [agents, actions]: [usize; 2],
+        schedule: PartitionSchedule,
+        selection: Selection,
+        delegation: Delegation,
+        seed: u64,
+    ) -> Result<Self, Error> {
+        let partitions = schedule.plan(agents, seed)?;
+        let part = |level: usize| move |group: usize| Part { level, group };
+        let divisions = partitions
+            .fixed()
+            .iter()
+            .map(|partition| division(partition, part(1), part(2)));
+        let mut team = team(agents, divisions.collect());
+        team.divisions = partitions.count();
+        team.selection = selection;
+        let levels = vec![team, pairs(agents, 2, delegation), alone(agents)];
+        let rounds = (!partitions.are_fixed()).then_some(partitions);
+        Ok(Self::new([agents, actions], levels, rounds, true))
+    }
+
+    /// Team → fours → pairs → agents: the team divides into groups of four, a four chooses among its three partitions into
+    /// pairs on its *own* common knowledge, and pairs act jointly or divide. Where the team is no multiple of four, what is
+    /// left of it divides into pairs at once.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if there are more than 8 agents: ten have 1 575 divisions into fours.
+    pub fn fours([agents, actions]: [usize; 2], delegation: Delegation) -> Result<Self, Error> {
+        const SIZE: usize = 4;
+        let most = PartitionSchedule::MOST_AGENTS_ENUMERATED;
+        if agents == 0 || agents > most {
+            return Err(Error::Config(format!(
+                "a team of {agents} cannot choose among all its divisions into fours, expected 1 to {most} agents"
+            )));
+        }
+        let everybody: Vec<AgentId> = (0..agents).map(AgentId::new).collect();
+        let pairing = Pairs::new(agents);
+        let small = |group: &[AgentId]| match *group {
+            [agent] => Part {
+                level: 3,
+                group: agent.index(),
+            },
+            [a, b] => Part {
+                level: 2,
+                group: pairing.index_of(a, b),
+            },
+            _ => unreachable!("groups of three and more divide further"),
+        };
+        let mut fours: Vec<Vec<AgentId>> = Vec::new();
+        let mut divisions = Vec::new();
+        for groups in ways_to_divide(&everybody, SIZE) {
+            let (large, rest): (Vec<_>, Vec<_>) =
+                groups.into_iter().partition(|group| group.len() == SIZE);
+            let parts = large.into_iter().map(|group| {
+                let known = fours.iter().position(|four| *four == group);
+                let group = known.unwrap_or_else(|| {
+                    fours.push(group);
+                    fours.len() - 1
+                });
+                Part { level: 1, group }
+            });
+            let parts: Vec<Part> = parts.collect();
+            for rest in ways_to_divide(&rest.concat(), 2) {
+                let rest = rest.iter().map(|group| small(group));
+                divisions.push(Division {
+                    parts: parts.iter().copied().chain(rest).collect(),
+                });
+            }
+        }
+        let inner = fours.iter().map(|four| {
+            let ways = ways_to_divide(four, 2).into_iter();
+            ways.map(|pairs| Division {
+                parts: pairs.iter().map(|pair| small(pair)).collect(),
+            })
+            .collect()
+        });
+        let four = Level {
+            name: "four_controller",
+            divisions_gd: inner.collect(),
+            divisions: 3,
+            groups: fours,
+            acts: None,
+            selection: Selection::Learned,
+            reads: Reads::CommonKnowledgeAndMembers,
+            explores: false,
+            active: Vec::new(),
+        };
+        let mut team = team(agents, divisions);
+        team.name = "four_selector";
+        let levels = vec![team, four, pairs(agents, 3, delegation), alone(agents)];
+        Ok(Self::new([agents, actions], levels, None, false))
+    }
+
+    /// No upper levels: every agent acts alone, as in Central-V.
+    ///
+    /// # Panics
+    /// If there are no agents.
+    #[must_use]
+    pub fn agents_alone([agents, actions]: [usize; 2]) -> Self {
+        assert!(agents > 0, "a team has agents");
+        let parts = (0..agents).map(|group| Part { level: 1, group }).collect();
+        let levels = vec![team(agents, vec![Division { parts }]), alone(agents)];
+        Self::new([agents, actions], levels, None, false)
+    }
+
+    fn new(
+        [agents, actions]: [usize; 2],
+        mut levels: Vec<Level>,
+        rounds: Option<Partitions>,
+        is_pairwise: bool,
+    ) -> Self {
+        debug_assert!(
+            levels.len() <= LEVELS_MAX,
+            "a declaration has at most four levels"
+        );
+        let mut reached: Vec<Vec<bool>> = levels
+            .iter()
+            .map(|level| vec![rounds.is_some(); level.groups.len()])
+            .collect();
+        reached[TEAM].fill(true);
+        for level in &levels {
+            for part in level
+                .divisions_gd
+                .iter()
+                .flatten()
+                .flat_map(|division| &division.parts)
+            {
+                reached[part.level][part.group] = true;
+            }
+        }
+        for (level, reached) in levels.iter_mut().zip(reached) {
+            level.active = (0..reached.len()).filter(|&group| reached[group]).collect();
+        }
+        Self {
+            agents,
+            actions,
+            levels,
+            rounds,
+            is_pairwise,
+        }
+    }
+
+    /// N: agents.
+    #[must_use]
+    pub const fn agents(&self) -> usize {
+        self.agents
+    }
+
+    /// A: actions of an agent.
+    #[must_use]
+    pub const fn actions(&self) -> usize {
+        self.actions
+    }
+
+    /// The levels, from the team to single agents.
+    #[must_use]
+    pub fn levels(&self) -> &[Level] {
+        &self.levels
+    }
+
+    /// The level of single agents.
+    #[must_use]
+    pub const fn alone(&self) -> usize {
+        self.levels.len() - 1
+    }
+
+    /// Whether this is [`Declaration::pairwise`], whose marginal has a closed form.
+    #[must_use]
+    pub const fn is_pairwise(&self) -> bool {
+        self.is_pairwise
+    }
+
+    /// Whether the team may divide in the same ways at every step, so that every active group can be asked at every step.
+    #[must_use]
+    pub const fn is_fixed(&self) -> bool {
+        self.rounds.is_none()
+    }
+
+    /// The ways in which the team may divide at `step` of the episode named `key`: a pure function of the two.
+    #[must_use]
+    pub fn in_force<'a>(
+        &'a self,
+        key: &EpisodeKey,
+        step: usize,
+        buffer: &'a mut DivisionBuffer,
+    ) -> &'a [Division] {
+        let Some(rounds) = &self.rounds else {
+            return &self.levels[TEAM].divisions_gd[0];
+        };
+        let DivisionBuffer {
+            partitions,
+            division,
+        } = buffer;
+        let [partition, ..] = rounds.in_force(key, step, partitions) else {
+            unreachable!("a round robin has one partition at a step");
+        };
+        division.parts.clear();
+        division
+            .parts
+            .extend(partition.pairs().iter().map(|pair| Part {
+                level: 1,
+                group: pair.index(),
+            }));
+        division
+            .parts
+            .extend(partition.singleton().map(|agent| Part {
+                level: 2,
+                group: agent.index(),
+            }));
+        std::slice::from_ref(division)
+    }
+
+    /// The divisions of a group, `in_force` being those of the team.
+    #[must_use]
+    pub fn divisions<'a>(&'a self, part: Part, in_force: &'a [Division]) -> &'a [Division] {
+        if part.level == TEAM {
+            in_force
+        } else {
+            self.levels[part.level]
+                .divisions_gd
+                .get(part.group)
+                .map_or(&[], Vec::as_slice)
+        }
+    }
+
+    /// The members of a group.
+    #[must_use]
+    pub fn members(&self, part: Part) -> &[AgentId] {
+        &self.levels[part.level].groups[part.group]
+    }
+}
+
+/// A partition as a division into pairs and, of an odd team, the agent that stays alone.
+fn division(
+    partition: &Partition,
+    pair: impl Fn(usize) -> Part,
+    agent: impl Fn(usize) -> Part,
+) -> Division {
+    let pairs = partition.pairs().iter().map(|own: &Pair| pair(own.index()));
+    let alone = partition.singleton().map(|own| agent(own.index()));
+    Division {
+        parts: pairs.chain(alone).collect(),
+    }
+}
+
+fn team(agents: usize, divisions: Vec<Division>) -> Level {
+    Level {
+        name: "pair_selector",
+        groups: vec![(0..agents).map(AgentId::new).collect()],
+        divisions: divisions.len(),
+        divisions_gd: vec![divisions],
+        acts: None,
+        selection: Selection::Learned,
+        reads: Reads::CommonKnowledge,
+        explores: false,
+        active: Vec::new(),
+    }
+}
+
+/// All pairs; a pair divides into its members, who stand at level `below`.
+fn pairs(agents: usize, below: usize, delegation: Delegation) -> Level {
+    let pairs = Pairs::new(agents);
+    let divisions = pairs.iter().map(|pair| {
+        let members = pair.agents().into_iter();
+        let parts = members.map(|agent| Part {
+            level: below,
+            group: agent.index(),
+        });
+        vec![Division {
+            parts: parts.collect(),
+        }]
+    });
+    Level {
+        name: "pair_controller",
+        divisions_gd: divisions.collect(),
+        divisions: 1,
+        groups: pairs.iter().map(|pair| pair.agents().to_vec()).collect(),
+        acts: Some(delegation),
+        selection: Selection::Learned,
+        reads: Reads::CommonKnowledgeAndMembers,
+        explores: true,
+        active: Vec::new(),
+    }
+}
+
+fn alone(agents: usize) -> Level {
+    Level {
+        name: "agent_controller",
+        groups: (0..agents).map(|agent| vec![AgentId::new(agent)]).collect(),
+        divisions_gd: Vec::new(),
+        divisions: 0,
+        acts: Some(Delegation::Never),
+        selection: Selection::Learned,
+        reads: Reads::OwnObservation,
+        explores: true,
+        active: Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sorted(declaration: &Declaration, division: &Division) -> Vec<usize> {
+        let members = division
+            .parts
+            .iter()
+            .flat_map(|part| declaration.members(*part));
+        let mut members: Vec<usize> = members.map(|agent| agent.index()).collect();
+        members.sort_unstable();
+        members
+    }
+
+    #[test]
+    fn every_division_of_every_group_is_a_partition_of_it() {
+        let pairwise = |agents| {
+            Declaration::pairwise(
+                [agents, 3],
+                PartitionSchedule::All,
+                Selection::Learned,
+                Delegation::Learned,
+                1,
+            )
+        };
+        for agents in 1..=8 {
+            for declaration in [
+                pairwise(agents).unwrap(),
+                Declaration::fours([agents, 3], Delegation::Learned).unwrap(),
+                Declaration::agents_alone([agents, 3]),
+            ] {
+                for (place, level) in declaration.levels().iter().enumerate() {
+                    for (group, divisions) in level.divisions_gd.iter().enumerate() {
+                        assert_eq!(
+                            divisions.len(),
+                            level.divisions,
+                            "{} agents, {}",
+                            agents,
+                            level.name
+                        );
+                        let members: Vec<usize> = level.groups[group]
+                            .iter()
+                            .map(|agent| agent.index())
+                            .collect();
+                        for division in divisions {
+                            assert_eq!(sorted(&declaration, division), members);
+                            assert!(division.parts.iter().all(|part| part.level > place));
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn eight_agents_have_35_divisions_into_fours_and_each_four_has_three() {
+        let fours = Declaration::fours([8, 14], Delegation::Learned).unwrap();
+        let levels = fours.levels();
+        assert_eq!(
+            levels
+                .iter()
+                .map(|level| level.groups.len())
+                .collect::<Vec<_>>(),
+            [1, 70, 28, 8]
+        );
+        assert_eq!(
+            levels
+                .iter()
+                .map(|level| level.columns(14))
+                .collect::<Vec<_>>(),
+            [35, 3, 1 + 14 * 14, 14]
+        );
+        assert!(Declaration::fours([9, 2], Delegation::Learned).is_err());
+    }
+
+    #[test]
+    fn columns_count_divisions_first_and_then_joint_actions() {
+        let declaration = Declaration::fours([8, 14], Delegation::Learned).unwrap();
+        let actions: Vec<mackrl_env::Action> = (0..8).map(mackrl_env::Action::new).collect();
+        let [team, four, pair, agent] = declaration.levels() else {
+            panic!("four levels");
+        };
+        assert_eq!(
+            (team.column(0, 14, &actions), four.column(3, 14, &actions)),
+            (None, None)
+        );
+        // Pair 1 is of agents 0 and 2.
+        assert_eq!(pair.column(1, 14, &actions), Some(1 + 2));
+        assert_eq!(agent.column(5, 14, &actions), Some(5));
+    }
+}
