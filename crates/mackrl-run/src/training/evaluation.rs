@@ -132,11 +132,6 @@ impl Evaluator {
         self.rollout.discarded()
     }
 
-    /// What the latest episodes were played with.
-    pub(super) const fn rollout(&mut self) -> &mut Rollout {
-        &mut self.rollout
-    }
-
     /// Plays `episodes` greedy episodes, of which number `i` is named `key(i)`.
     pub(super) fn play(
         &mut self,
