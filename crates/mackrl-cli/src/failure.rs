@@ -7,6 +7,7 @@ use std::{
     process::ExitCode,
 };
 
+use mackrl::NotFinite;
 use mackrl_env::StepError;
 use mackrl_run::config::{Config, ConfigError};
 
@@ -31,15 +32,11 @@ pub(crate) enum Failure {
     NotARun { folder: PathBuf },
     /// Stored data that cannot be used.
     BadData { message: String },
-    /// A folder in which no dump lies.
-    NotADump { folder: PathBuf },
-    /// An update with a number that is not finite, of which nothing was kept but, if it could be written, a dump.
+    /// An update with a number that is not finite, of which nothing was kept.
     UpdateRefused {
-        message: String,
-        dump: Option<PathBuf>,
+        number: Box<NotFinite>,
+        folder: PathBuf,
     },
-    /// A dump whose update does not go wrong as it did.
-    NotReproduced { message: String },
     /// Two things that were compared are not the same.
     Different {
         /// The first difference, in words.
@@ -126,17 +123,11 @@ impl fmt::Display for Failure {
                     "interrupted when {finished} of {runs} runs were finished"
                 )
             }
-            Self::NotADump { folder } => write!(
-                formatter,
-                "{} is no dump and holds none: it has neither failure.json nor dumps/",
-                folder.display()
-            ),
-            Self::UpdateRefused { message, .. } => {
-                write!(formatter, "the run cannot go on: {message}")
+            Self::UpdateRefused { number, .. } => {
+                write!(formatter, "the run cannot go on: {number}")
             }
             Self::Different { first } => write!(formatter, "they differ, first in {first}"),
-            Self::NotReproduced { message }
-            | Self::BadData { message }
+            Self::BadData { message }
             | Self::Usage { message }
             | Self::MissingMetric { message }
             | Self::UnlikeRuns { message, .. }
@@ -236,7 +227,6 @@ fn exit_of(cause: &(dyn std::error::Error + 'static)) -> Option<Exit> {
             | Failure::UnfinishedRun { .. }
             | Failure::FolderLocked { .. }
             | Failure::NotARun { .. }
-            | Failure::NotADump { .. }
             | Failure::OtherCode { .. }
             | Failure::OtherConfiguration { .. }
             | Failure::MissingMetric { .. }
@@ -248,9 +238,7 @@ fn exit_of(cause: &(dyn std::error::Error + 'static)) -> Option<Exit> {
             | Failure::ReplayDiffers { .. }
             | Failure::OtherSimulator { .. } => Exit::Data,
             Failure::NotReady { .. } => Exit::InputOutput,
-            Failure::CertificateFailed { .. }
-            | Failure::Different { .. }
-            | Failure::NotReproduced { .. } => Exit::Differs,
+            Failure::CertificateFailed { .. } | Failure::Different { .. } => Exit::Differs,
         });
     }
     if let Some(error) = cause.downcast_ref::<mackrl::Error>() {
@@ -293,15 +281,9 @@ fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
             ),
             Failure::SweepInterrupted { .. } => Some("go on with the same command".to_owned()),
             Failure::UnlikeRuns { remedy, .. } => Some(remedy.clone()),
-            Failure::NotADump { .. } => Some(
-                "give the folder that `mackrl train` named when it stopped, such as runs/3m-mackrl-seed1/dumps/update-41"
-                    .to_owned(),
-            ),
-            Failure::UpdateRefused {
-                dump: Some(dump), ..
-            } => Some(format!(
-                "`mackrl debug {}` repeats the update and shows where the number comes from",
-                dump.display()
+            Failure::UpdateRefused { folder, .. } => Some(format!(
+                "`mackrl resume {}` goes on from the last checkpoint and repeats the update to the bit; smaller learning rates, gradients or rewards avoid it",
+                folder.display()
             )),
             Failure::OtherCode { .. } => Some(
                 "take such results as they are with --any-code, or choose another folder with --out"

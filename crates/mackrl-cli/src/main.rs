@@ -46,7 +46,6 @@ fn main() -> ExitCode {
         Command::Serve(args) => commands::serve::run(&args),
         Command::Maps(args) => commands::maps::run(&args),
         Command::Diff(args) => commands::diff::run(&args),
-        Command::Debug(args) => commands::debug::run(&args),
         Command::Config(args) => commands::config::run(&args),
         Command::Bench(args) => commands::bench::run(&args),
         Command::Sc2(args) => commands::sc2::run(&args),

@@ -2,7 +2,6 @@
 
 use std::{path::PathBuf, time::Instant};
 
-use mackrl::NotFinite;
 use mackrl_run::{
     config::Config,
     training::{Checkpoint, MetricRow, Trainer},
@@ -12,9 +11,9 @@ use serde::Serialize;
 use crate::{
     failure::Failure,
     output,
-    progress::{Detail, Progress, Standing},
+    progress::{Progress, Standing},
     provenance::Provenance,
-    run_folder::{Refusal, RunFolder, Status},
+    run_folder::{RunFolder, Status},
     signals::StopRequest,
 };
 
@@ -135,8 +134,7 @@ pub(crate) struct Summary {
     steps_per_s: f64,
 }
 
-/// Trains to the end, or until asked to stop, and keeps metrics, checkpoints, status and weights in `folder`; the
-/// person who waits is shown as much as `detail` says.
+/// Trains to the end, or until asked to stop, and keeps metrics, checkpoints, status and weights in `folder`.
 ///
 /// # Errors
 /// [`Failure::Interrupted`] when asked to stop, after a checkpoint; otherwise what went wrong.
@@ -145,9 +143,8 @@ pub(crate) fn train_into(
     training: &mut impl Training,
     config: &Config,
     stop: &StopRequest,
-    detail: Detail,
 ) -> anyhow::Result<Summary> {
-    let mut progress = Progress::new(training.standing().steps_env, detail);
+    let mut progress = Progress::new(training.standing().steps_env);
     let outcome = train(folder, training, config, stop, &mut progress);
     progress.finish();
     let recorded = folder.set_status(match &outcome {
@@ -188,13 +185,16 @@ fn train(
             // What was begun was given up; the checkpoint is that of the moment before.
             Err(mackrl::Error::Stopped) => continue,
             Err(mackrl::Error::NotFinite(number)) => {
-                return Err(refuse(folder, training, config, *number));
+                return Err(Failure::UpdateRefused {
+                    number,
+                    folder: folder.path().to_owned(),
+                }
+                .into());
             }
             outcome => outcome?,
         };
         if let Some(metrics) = metrics {
             folder.append_metrics(&metrics)?;
-            progress.hear(&metrics);
         }
         progress.show(&standing);
         if standing.steps_env / interval > intervals {
@@ -212,32 +212,6 @@ fn train(
         wall_s,
         steps_per_s: (steps_env - steps_env_before) as f64 / wall_s.max(1e-9),
     })
-}
-
-/// Keeps a refused update, of which the trainer has kept nothing, and gives the error that ends the run.
-fn refuse(
-    folder: &mut RunFolder,
-    training: &impl Training,
-    config: &Config,
-    number: NotFinite,
-) -> anyhow::Error {
-    let refusal = Refusal {
-        message: number.to_string(),
-        number,
-        provenance: Provenance::of_run(config),
-    };
-    let message = refusal.message.clone();
-    match folder.write_dump(&refusal, &training.checkpoint()) {
-        Ok(dump) => Failure::UpdateRefused {
-            message,
-            dump: Some(dump),
-        },
-        Err(error) => Failure::UpdateRefused {
-            message: format!("{message}; what it takes to repeat this is lost: {error:#}"),
-            dump: None,
-        },
-    }
-    .into()
 }
 
 /// Prints what a finished run says of itself.
@@ -319,7 +293,7 @@ mod tests {
         config.run.checkpoint_interval_steps_env = 2;
         let mut folder = RunFolder::create(&path, &config, 1).unwrap();
         let stop = training.stop.clone();
-        let outcome = train_into(&mut folder, &mut training, &config, &stop, Detail::Line);
+        let outcome = train_into(&mut folder, &mut training, &config, &stop);
         (parent, path, outcome)
     }
 

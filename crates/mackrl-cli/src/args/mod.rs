@@ -27,7 +27,7 @@ pub(crate) use bench::{
     BenchArgs, BenchCommand, BenchEnvironmentArgs, BenchTrainArgs, BenchUpdateArgs,
 };
 pub(crate) use configuration::{ConfigurationArgs, read_scenario, with_scenario, world};
-pub(crate) use inquiry::{DebugArgs, DiffArgs};
+pub(crate) use inquiry::DiffArgs;
 pub(crate) use play::{PlayArgs, PolicyChoice};
 pub(crate) use replay::{ExplainArgs, ReplayArgs};
 pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, TrainArgs};
@@ -71,7 +71,6 @@ pub(crate) enum Command {
     Serve(ServeRunsArgs),
     Maps(MapsArgs),
     Diff(DiffArgs),
-    Debug(DebugArgs),
     Config(ConfigArgs),
     Bench(BenchArgs),
     Sc2(Sc2Args),

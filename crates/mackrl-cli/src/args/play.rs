@@ -18,7 +18,7 @@ use crate::args::runs::ThreadsArgs;
 /// --out keeps them in a folder, as JSON and as a page with tables of maps by policies; results/scripted was made so.
 ///
 /// --save-replay keeps the first episode: the map, the settings, the seed, every action and a hash of the state after every
-/// step. `mackrl replay` shows it as a page, a picture or a film. --svg draws one step of it at once.
+/// step. `mackrl replay` shows it as a page or a picture. --svg draws one step of it at once.
 ///
 /// Examples:
 ///   mackrl play --map 2s3z --policy focus-fire --episodes 1000 --json

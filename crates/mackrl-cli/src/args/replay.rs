@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-/// Look into a replay: a page for the browser, pictures, a film
+/// Look into a replay: a page for the browser, a picture of a step
 ///
 /// Plays the episode again and compares every state with the recording; what is shown is what happened. Without an output it
 /// says how the episode went. `mackrl play --save-replay` and `mackrl evaluate --save-replays` write replays.
@@ -16,7 +16,6 @@ use clap::Args;
 /// Examples:
 ///   mackrl replay battle.replay.gz --html battle.html
 ///   mackrl replay battle.replay.gz --svg battle.svg --step 12 --group A,B
-///   mackrl replay battle.replay.gz --gif battle.gif
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct ReplayArgs {
@@ -31,14 +30,6 @@ pub(crate) struct ReplayArgs {
     /// Draw one step as an SVG picture
     #[arg(long, value_name = "OUT")]
     pub(crate) svg: Option<PathBuf>,
-
-    /// Draw one step as a PNG image
-    #[arg(long, value_name = "OUT")]
-    pub(crate) png: Option<PathBuf>,
-
-    /// Draw the whole battle as an animated GIF
-    #[arg(long, value_name = "OUT")]
-    pub(crate) gif: Option<PathBuf>,
 
     /// Steps that have passed in what is drawn or shown first: 0 is the start [default: half of the episode; 0 in pages]
     #[arg(long, value_name = "T")]

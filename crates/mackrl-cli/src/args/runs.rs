@@ -4,7 +4,7 @@ use std::{num::NonZeroUsize, path::PathBuf};
 
 use clap::Args;
 
-use crate::{args::ConfigurationArgs, progress::Detail};
+use crate::args::ConfigurationArgs;
 
 /// Train a team, and write its weights, metrics and configuration into a run folder
 ///
@@ -27,9 +27,6 @@ pub(crate) struct TrainArgs {
     #[command(flatten)]
     pub(crate) threads: ThreadsArgs,
 
-    #[command(flatten)]
-    pub(crate) dashboard: DashboardArgs,
-
     /// Print a JSON summary at the end instead of a sentence
     #[arg(long)]
     pub(crate) json: bool,
@@ -49,9 +46,6 @@ pub(crate) struct ResumeArgs {
 
     #[command(flatten)]
     pub(crate) threads: ThreadsArgs,
-
-    #[command(flatten)]
-    pub(crate) dashboard: DashboardArgs,
 
     /// Print a JSON summary at the end instead of a sentence
     #[arg(long)]
@@ -144,24 +138,6 @@ pub(crate) struct ThreadsArgs {
     /// Threads to use; changes no result [default: all cores]
     #[arg(long, value_name = "K")]
     threads: Option<NonZeroUsize>,
-}
-
-#[derive(Debug, Args)]
-pub(crate) struct DashboardArgs {
-    /// Show curves while training: win rate, return, delegation, entropies, steps a second; plain lines where stderr is no terminal
-    #[arg(long)]
-    dashboard: bool,
-}
-
-impl DashboardArgs {
-    /// What was asked for.
-    pub(crate) const fn detail(&self) -> Detail {
-        if self.dashboard {
-            Detail::Dashboard
-        } else {
-            Detail::Line
-        }
-    }
 }
 
 impl ThreadsArgs {

@@ -3,7 +3,6 @@
 pub(crate) mod bench;
 pub(crate) mod certify;
 pub(crate) mod config;
-pub(crate) mod debug;
 pub(crate) mod diff;
 pub(crate) mod evaluate;
 pub(crate) mod execute_agent;

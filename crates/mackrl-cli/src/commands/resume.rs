@@ -11,7 +11,6 @@ use crate::{
     args::ResumeArgs,
     commands::sc2,
     failure::printable,
-    progress::Detail,
     provenance::CODE,
     run_folder::{Resumption, RunFolder},
     signals::StopRequest,
@@ -24,12 +23,7 @@ pub(crate) fn run(args: &ResumeArgs) -> anyhow::Result<()> {
     if args.leashed {
         stop.make_when_stdin_ends();
     }
-    match go_on(
-        &args.run,
-        args.threads.count(),
-        &stop,
-        args.dashboard.detail(),
-    )? {
+    match go_on(&args.run, args.threads.count(), &stop)? {
         Some(summary) => training_loop::print(&summary, args.json),
         None => Ok(()),
     }
@@ -43,7 +37,6 @@ pub(crate) fn go_on(
     path: &Path,
     threads: usize,
     stop: &StopRequest,
-    detail: Detail,
 ) -> anyhow::Result<Option<Summary>> {
     if RunFolder::is_finished(path) {
         // Nothing is wrong: whoever starts runs again until they are finished gets what they want.
@@ -79,5 +72,5 @@ pub(crate) fn go_on(
         None => Trainer::in_world(&config, &world, threads)?,
     };
     let mut training = Reporting::new(trainer, &config, stop);
-    training_loop::train_into(&mut folder, &mut training, &config, stop, detail).map(Some)
+    training_loop::train_into(&mut folder, &mut training, &config, stop).map(Some)
 }

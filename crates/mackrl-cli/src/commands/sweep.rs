@@ -7,7 +7,6 @@ use crate::{
     args::SweepArgs,
     failure::Failure,
     output,
-    progress::Detail,
     signals::StopRequest,
     sweep::{Entry, Outcome, Plan, State, make_all},
     training_loop,
@@ -93,7 +92,7 @@ fn one(plan: &Plan, index: usize, args: &SweepArgs, stop: &StopRequest) -> anyho
     // Refuses a folder with another run, before anything is written.
     entry.state()?;
     entry.prepare()?;
-    match resume::go_on(&entry.folder, args.threads.count(), stop, Detail::Line)? {
+    match resume::go_on(&entry.folder, args.threads.count(), stop)? {
         Some(summary) => training_loop::print(&summary, args.json),
         None if args.json => output::print_json(&Listed::of((index, entry))?),
         None => Ok(()),

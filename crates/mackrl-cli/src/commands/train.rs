@@ -25,8 +25,7 @@ pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<()> {
         &stop,
     );
     let mut folder = RunFolder::create(&path, &config, threads)?;
-    let detail = args.dashboard.detail();
-    let summary = training_loop::train_into(&mut folder, &mut training, &config, &stop, detail)?;
+    let summary = training_loop::train_into(&mut folder, &mut training, &config, &stop)?;
     training_loop::print(&summary, args.json)
 }
 

@@ -21,7 +21,6 @@ mod text;
 pub(crate) use battle::{BattlePicture, Figure, Lens, Link, Shot, Side};
 pub(crate) use chart::{Axis, Colour, Corner, LineChart, Mark, Point, Series};
 pub(crate) use multiples::{Multiple, SmallMultiples};
-pub(crate) use png::Pixels;
 
 #[cfg(test)]
 mod tests;

@@ -16,41 +16,18 @@ use super::{
 /// Image pixels per unit of the scene.
 const SCALE: u16 = 2;
 
-/// An image as rows of red, green and blue.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Pixels {
-    pub(crate) width: u16,
-    pub(crate) height: u16,
-    /// Three bytes a pixel, row by row.
-    pub(crate) rgb: Vec<u8>,
-}
-
 /// The encoded image.
 pub(super) fn write(scene: &Scene) -> anyhow::Result<Vec<u8>> {
-    draw(scene, SCALE)?
+    draw(scene)?
         .encode_png()
         .context("encoding the chart as PNG")
 }
 
-/// The image at the SVG's size.
-pub(super) fn pixels(scene: &Scene) -> anyhow::Result<Pixels> {
-    let image = draw(scene, 1)?;
-    // The background is opaque, so everything is.
-    let pixels = image.pixels().iter();
-    Ok(Pixels {
-        width: scene.width,
-        height: scene.height,
-        rgb: pixels
-            .flat_map(|pixel| [pixel.red(), pixel.green(), pixel.blue()])
-            .collect(),
-    })
-}
-
-fn draw(scene: &Scene, scale: u16) -> anyhow::Result<Pixmap> {
-    let [width, height] = [scene.width, scene.height].map(|size| u32::from(size * scale));
+fn draw(scene: &Scene) -> anyhow::Result<Pixmap> {
+    let [width, height] = [scene.width, scene.height].map(|size| u32::from(size * SCALE));
     let mut canvas = Canvas {
         pixmap: Pixmap::new(width, height).context("the chart has no area")?,
-        transform: Transform::from_scale(f32::from(scale), f32::from(scale)),
+        transform: Transform::from_scale(f32::from(SCALE), f32::from(SCALE)),
         mask: None,
     };
     canvas.pixmap.fill(tiny_skia::Color::WHITE);

@@ -1,15 +1,9 @@
-//! What a person sees while a run goes on: one line that is renewed on a terminal, or curves if they are asked for, and a plain line
-//! now and then elsewhere.
-
-mod dashboard;
+//! What a person sees while a run goes on: one line that is renewed on a terminal, and a plain line now and then elsewhere.
 
 use std::{
     io::{self, IsTerminal, Write},
     time::{Duration, Instant},
 };
-
-use dashboard::Dashboard;
-use terminal_size::{Height, Width, terminal_size_of};
 
 const TERMINAL_INTERVAL: Duration = Duration::from_millis(500);
 const PLAIN_INTERVAL: Duration = Duration::from_secs(30);
@@ -36,17 +30,6 @@ pub(crate) struct Progress {
     steps_env_at_start: u64,
     shown: Option<Instant>,
     latest: Option<Standing>,
-    /// Curves instead of a line, where there is room.
-    dashboard: Option<Dashboard>,
-}
-
-/// What a person wants to see of a run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Detail {
-    /// One line.
-    Line,
-    /// Curves, on terminals; elsewhere lines.
-    Dashboard,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,7 +40,7 @@ enum Style {
 
 impl Progress {
     /// Starts the clock of a run that has played `steps_env` environment steps; the style is what stderr can show.
-    pub(crate) fn new(steps_env: u64, detail: Detail) -> Self {
+    pub(crate) fn new(steps_env: u64) -> Self {
         let style = if io::stderr().is_terminal() {
             Style::Terminal
         } else {
@@ -69,15 +52,6 @@ impl Progress {
             start: Instant::now(),
             shown: None,
             latest: None,
-            dashboard: (detail == Detail::Dashboard && style == Style::Terminal)
-                .then(Dashboard::default),
-        }
-    }
-
-    /// Hears a row of metrics as it is written.
-    pub(crate) fn hear(&mut self, row: &str) {
-        if let Some(dashboard) = &mut self.dashboard {
-            dashboard.hear(row);
         }
     }
 
@@ -95,30 +69,14 @@ impl Progress {
     pub(crate) fn finish(&mut self) {
         if let Some(standing) = self.latest.take() {
             self.write(&standing);
-            if self.style == Style::Terminal && !self.has_room() {
+            if self.style == Style::Terminal {
                 write_stderr("\n");
             }
         }
     }
 
-    /// Whether curves are wanted, and the terminal is large enough.
-    fn has_room(&self) -> bool {
-        let [columns, rows] = dashboard::ROOM;
-        let size = terminal_size_of(io::stderr());
-        let has_room = |(Width(width), Height(height))| width >= columns && height >= rows;
-        self.dashboard.is_some() && size.is_some_and(has_room)
-    }
-
-    fn write(&mut self, standing: &Standing) {
+    fn write(&self, standing: &Standing) {
         let line = line(standing, self.steps_env_at_start, self.start.elapsed());
-        if self.has_room()
-            && let Some(dashboard) = &mut self.dashboard
-        {
-            let done = standing.steps_env as f64 / standing.steps_env_total.max(1) as f64;
-            let width = terminal_size_of(io::stderr()).map_or(80, |(Width(width), _)| width);
-            write_stderr(&dashboard.draw(&line, done, width));
-            return;
-        }
         match self.style {
             // Back to the start of the line, and clear what is left of the previous one.
             Style::Terminal => write_stderr(&format!("\r{line}\x1b[K")),

@@ -1,7 +1,6 @@
 //! Looking into replays: how they are opened, told, drawn and shown.
 
 mod explanation;
-mod film;
 mod page;
 mod picture;
 mod summary;
@@ -13,7 +12,6 @@ use mackrl_run::replay::{Names, Playback, Replay, ReplayError};
 
 use crate::{bounded, failure::Failure};
 pub(crate) use explanation::Explanation;
-pub(crate) use film::film;
 pub(crate) use page::page;
 pub(crate) use picture::picture;
 pub(crate) use summary::Summary;

@@ -43,7 +43,6 @@ pub(crate) fn picture(opened: &Opened, step: usize, group: &[AgentId]) -> Battle
             .map(|(x, y)| terrain.is_walkable(x, y))
             .collect(),
         edge: MAP_SIZE,
-        ground_shown: Vec::new(),
         figures: (0..state.units.len())
             .map(|index| figure(opened, state, before, index))
             .collect(),

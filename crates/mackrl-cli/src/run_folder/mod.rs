@@ -5,7 +5,6 @@
 //! DIR/run.json              command line, provenance, status
 //! DIR/metrics.jsonl         one JSON object a line
 //! DIR/checkpoints/          the latest few, from which the run continues
-//! DIR/dumps/                updates that were refused because of a number that is not finite
 //! DIR/weights.safetensors   the policy and the critic; written at the end
 //! DIR/events.out.tfevents.* the metrics for TensorBoard, if `run.tensorboard` is set; one file for each process that trained
 //! DIR/lock                  held by the process that writes
@@ -17,7 +16,6 @@
 
 mod checkpoints;
 mod disk;
-mod dumps;
 mod event_file;
 mod latest;
 mod manifest;
@@ -45,7 +43,6 @@ use crate::{
     failure::Failure,
     provenance::{CODE, Provenance},
 };
-pub(crate) use dumps::{Dump, Refusal};
 use event_file::EventFile;
 pub(crate) use latest::{LatestRow, latest_row};
 use manifest::{Fingerprint, Growing};
@@ -85,20 +82,6 @@ struct RunRecord {
     /// Threads in use, which change no result.
     threads: usize,
     status: Status,
-    /// Why the run cannot go on, if it cannot.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    refusal: Option<RecordedRefusal>,
-}
-
-/// What `run.json` tells of an update that was refused.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-struct RecordedRefusal {
-    /// Why.
-    message: String,
-    /// The code that refused it; other code may not.
-    code: String,
-    /// Where its dump lies, from the run folder.
-    dump: PathBuf,
 }
 
 /// The folder of a run that is being made.
@@ -204,22 +187,12 @@ impl RunFolder {
     /// again.
     ///
     /// # Errors
-    /// [`Failure::NotARun`], [`Failure::FolderLocked`] if another process writes there, [`Failure::UpdateRefused`] if the run
-    /// stopped at an update that this program would refuse again, [`Failure::BadData`] if no checkpoint can be used; otherwise the path that could not be read or written.
+    /// [`Failure::NotARun`], [`Failure::FolderLocked`] if another process writes there, [`Failure::BadData`] if no checkpoint can be used; otherwise the path that could not be read or written.
     pub(crate) fn resume(path: &Path, threads: usize) -> anyhow::Result<Resumption> {
         untrusted::check(path)?;
         let config = run::read_config(path)?;
         let lock = lock(path)?;
         let record = read_record(path);
-        if let Some(refusal) = record.as_ref().and_then(|record| record.refusal.clone())
-            && refusal.code == CODE
-        {
-            return Err(Failure::UpdateRefused {
-                message: refusal.message,
-                dump: Some(path.join(refusal.dump)),
-            }
-            .into());
-        }
         let earlier_code = record
             .map(|record| match record.provenance.last() {
                 Some(provenance) => provenance.code.clone(),
@@ -257,10 +230,8 @@ impl RunFolder {
             provenance: Vec::new(),
             threads,
             status: Status::Running,
-            refusal: None,
         });
         record.threads = threads;
-        record.refusal = None;
         let provenance = Provenance::of_run(config);
         if !record.provenance.contains(&provenance) {
             record.provenance.push(provenance);
@@ -328,34 +299,6 @@ impl RunFolder {
             surroundings,
             self.checkpoints_kept,
         )
-    }
-
-    /// Keeps what the refused update needs to be repeated, and notes in `run.json`, when its status is written next, why the run
-    /// cannot go on; gives the dump's path.
-    ///
-    /// # Errors
-    /// Path, bytes and what the operating system says.
-    pub(crate) fn write_dump(
-        &mut self,
-        refusal: &Refusal,
-        before: &Checkpoint,
-    ) -> anyhow::Result<PathBuf> {
-        let config_path = self.path.join(CONFIG);
-        let config = fs::read(&config_path).with_context(|| cannot("read", &config_path))?;
-        let surroundings = self.surroundings();
-        let dump = dumps::write(
-            &*self.disk,
-            &self.path,
-            (refusal, before),
-            &config,
-            surroundings,
-        )?;
-        self.record.refusal = Some(RecordedRefusal {
-            message: refusal.message.clone(),
-            code: CODE.to_owned(),
-            dump: dump.strip_prefix(&self.path).unwrap_or(&dump).to_owned(),
-        });
-        Ok(dump)
     }
 
     fn surroundings(&self) -> Surroundings {

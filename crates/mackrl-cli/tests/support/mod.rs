@@ -67,13 +67,6 @@ pub(crate) fn resume(folder: &Path, threads: usize) -> Command {
     command
 }
 
-/// SHA-256 in hexadecimal.
-pub(crate) fn sha256(content: &[u8]) -> String {
-    use sha2::Digest;
-    let hash = sha2::Sha256::digest(content);
-    hash.iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
 /// Runs to the end, and expects this exit code; gives what stderr holds.
 pub(crate) fn exits(mut command: Command, code: i32) -> String {
     let output = command.output().expect("the program starts");

@@ -51,7 +51,7 @@ pub(super) fn compare_json(a: &Path, b: &Path) -> anyhow::Result<JsonFiles> {
     })
 }
 
-/// Compares two checkpoints, or dumps.
+/// Compares two checkpoints.
 pub(super) fn compare_checkpoints(a: &Path, b: &Path) -> anyhow::Result<Checkpoints> {
     let counters = |folder: &Path| read(&folder.join("counters.json"));
     let tensors = |folder: &Path| bounded::read(&folder.join("tensors.safetensors"), TENSORS_MAX);

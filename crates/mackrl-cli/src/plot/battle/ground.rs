@@ -24,11 +24,10 @@ pub(super) const WALL: Colour = Colour(0xC9, 0xC4, 0xB8);
 pub(super) struct Window([[usize; 2]; 2]);
 
 impl Window {
-    /// The cells about all units and about the places that have to be seen; the lens's fields of view too, where there is room.
+    /// The cells about all units; the lens's fields of view too, where there is room.
     pub(super) fn around(picture: &BattlePicture) -> Self {
-        let figures = picture.figures.iter().map(|figure| figure.at);
-        let places = figures.chain(picture.ground_shown.iter().copied());
-        let units: Vec<_> = places.map(|at| (at, SURROUNDINGS)).collect();
+        let figures = picture.figures.iter();
+        let units: Vec<_> = figures.map(|figure| (figure.at, SURROUNDINGS)).collect();
         let lens = picture.lens.iter().flat_map(|lens| &lens.fields);
         let fields = lens.map(|index| (picture.figures[*index].at, picture.sight + 0.5));
         let whole = Self::about(units.iter().copied().chain(fields), picture.edge);

@@ -10,11 +10,7 @@ mod legend;
 mod lens;
 mod marks;
 
-use super::{
-    chart::Colour,
-    png::{self, Pixels},
-    svg,
-};
+use super::{chart::Colour, svg};
 use drawing::Drawing;
 
 const INK: Colour = Colour(0x2B, 0x2B, 0x2B);
@@ -32,8 +28,6 @@ pub(crate) struct BattlePicture {
     pub(crate) walkable: Vec<bool>,
     /// Cells along an edge of the map.
     pub(crate) edge: usize,
-    /// Places that have to be in the picture even if nobody is there.
-    pub(crate) ground_shown: Vec<[f64; 2]>,
     /// All units, the dead ones too.
     pub(crate) figures: Vec<Figure>,
     /// Who aims at whom.
@@ -122,27 +116,6 @@ impl BattlePicture {
     #[must_use]
     pub(crate) fn to_svg(&self) -> String {
         svg::write(&Drawing::new(self).scene(), &self.title)
-    }
-
-    /// The picture as a PNG image.
-    ///
-    /// # Errors
-    /// If the image cannot be encoded.
-    pub(crate) fn to_png(&self) -> anyhow::Result<Vec<u8>> {
-        png::write(&Drawing::new(self).scene())
-    }
-
-    /// The picture as pixels, at the SVG's size.
-    ///
-    /// # Errors
-    /// If the picture has no area.
-    pub(crate) fn to_pixels(&self) -> anyhow::Result<Pixels> {
-        png::pixels(&Drawing::new(self).scene())
-    }
-
-    /// Fits the picture to the places `at` as well, so that pictures that are given the same places show the same ground.
-    pub(crate) fn show_too(&mut self, at: &[[f64; 2]]) {
-        self.ground_shown.extend(at);
     }
 }
 

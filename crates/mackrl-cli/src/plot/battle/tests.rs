@@ -1,6 +1,7 @@
 use tiny_skia::Pixmap;
 
 use super::*;
+use crate::plot::png;
 
 fn figure(side: Side, x: f64, life: f64) -> Figure {
     Figure {
@@ -22,7 +23,6 @@ fn picture(life: f64) -> BattlePicture {
         subtitle: "seed 1".to_owned(),
         walkable: (0..64).map(|cell| cell / 8 >= 3).collect(),
         edge: 8,
-        ground_shown: Vec::new(),
         figures: vec![figure(Side::Ally, 2.0, 1.0), figure(Side::Enemy, 6.0, life)],
         shots: vec![Shot {
             from: 0,
@@ -37,7 +37,8 @@ fn picture(life: f64) -> BattlePicture {
 }
 
 fn count(picture: &BattlePicture, Colour(red, green, blue): Colour) -> usize {
-    let image = Pixmap::decode_png(&picture.to_png().unwrap()).unwrap();
+    let image = png::write(&Drawing::new(picture).scene()).unwrap();
+    let image = Pixmap::decode_png(&image).unwrap();
     let same =
         |p: &&tiny_skia::PremultipliedColorU8| [p.red(), p.green(), p.blue()] == [red, green, blue];
     image.pixels().iter().filter(same).count()
