@@ -130,7 +130,11 @@ pub fn algorithm(
 ///
 /// # Errors
 /// As [`algorithm`], and [`Error::Data`] if the weights are not those of such a team.
-pub fn trained(config: &Config, world: &World, weights: &[u8]) -> Result<Box<dyn Algorithm>, Error> {
+pub fn trained(
+    config: &Config,
+    world: &World,
+    weights: &[u8],
+) -> Result<Box<dyn Algorithm>, Error> {
     let mut algorithm = algorithm(config, world, 1)?;
     algorithm.load(&StoredWeights(weights))?;
     Ok(algorithm)

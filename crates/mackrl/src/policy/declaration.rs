@@ -13,9 +13,7 @@ use mackrl_env::{Action, AgentId, Draw, EpisodeKey, declare_words};
 
 use crate::{
     Error,
-    partition::{
-        Pair, Pairs, Partition, PartitionBuffer, PartitionSchedule, Partitions, ways_to_divide,
-    },
+    partition::{Pairs, Partition, PartitionBuffer, PartitionSchedule, Partitions, ways_to_divide},
 };
 
 /// The level of the whole team: one group, the root.
@@ -188,11 +186,7 @@ impl Declaration {
         seed: u64,
     ) -> Result<Self, Error> {
         let partitions = schedule.plan(agents, seed)?;
-        let part = |level: usize| move |group: usize| Part { level, group };
-        let divisions = partitions
-            .fixed()
-            .iter()
-            .map(|partition| division(partition, part(1), part(2)));
+        let divisions = partitions.fixed().iter().map(Division::from);
         let mut team = team(agents, divisions.collect());
         team.divisions = partitions.count();
         team.selection = selection;
@@ -376,19 +370,7 @@ impl Declaration {
         let [partition, ..] = rounds.in_force(key, step, partitions) else {
             unreachable!("a round robin has one partition at a step");
         };
-        division.parts.clear();
-        division
-            .parts
-            .extend(partition.pairs().iter().map(|pair| Part {
-                level: 1,
-                group: pair.index(),
-            }));
-        division
-            .parts
-            .extend(partition.singleton().map(|agent| Part {
-                level: 2,
-                group: agent.index(),
-            }));
+        division.assign(partition);
         std::slice::from_ref(division)
     }
 
@@ -412,16 +394,28 @@ impl Declaration {
     }
 }
 
-/// A partition as a division into pairs and, of an odd team, the agent that stays alone.
-fn division(
-    partition: &Partition,
-    pair: impl Fn(usize) -> Part,
-    agent: impl Fn(usize) -> Part,
-) -> Division {
-    let pairs = partition.pairs().iter().map(|own: &Pair| pair(own.index()));
-    let alone = partition.singleton().map(|own| agent(own.index()));
-    Division {
-        parts: pairs.chain(alone).collect(),
+/// A partition as a division of the pairwise hierarchy: its pairs and, of an odd team, the agent that stays alone.
+impl From<&Partition> for Division {
+    fn from(partition: &Partition) -> Self {
+        let mut division = Self::default();
+        division.assign(partition);
+        division
+    }
+}
+
+impl Division {
+    /// Becomes the division of `partition`, without allocating if it had as many parts before.
+    fn assign(&mut self, partition: &Partition) {
+        let pairs = partition.pairs().iter().map(|pair| Part {
+            level: 1,
+            group: pair.index(),
+        });
+        let alone = partition.singleton().map(|agent| Part {
+            level: 2,
+            group: agent.index(),
+        });
+        self.parts.clear();
+        self.parts.extend(pairs.chain(alone));
     }
 }
 
