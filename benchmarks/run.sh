@@ -50,8 +50,8 @@ if [ -e benchmarks/peers/.venv ]; then
     python3 benchmarks/peers/compare.py --repetitions "$repetitions" --json "$folder/peers.json" | tee "$folder/peers.txt"
 fi
 {
-    cargo bench -p mackrl-env --bench step -- --quiet
-    cargo bench -p mackrl --bench hierarchy -- --quiet
-    cargo bench -p mackrl --bench update -- --quiet
+    cargo bench -p mackrl-skirmish --bench step -- --quiet
+    cargo bench -p mackrl-core --bench hierarchy -- --quiet
+    cargo bench -p mackrl-core --bench update -- --quiet
 } 2>/dev/null | grep -v '^$' >"$folder/criterion.txt"
 uptime >>"$folder/machine.txt"

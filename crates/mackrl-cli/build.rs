@@ -11,35 +11,48 @@ use std::{
 
 use sha2::{Digest, Sha256};
 
-/// Folders that results come from, relative to this crate. Those that are not there, as in a packaged crate, are left out.
-const SOURCES: [&str; 7] = [
-    "../mackrl/src",
-    "../mackrl-run/src",
-    "../mackrl-run/presets",
-    "../mackrl-env/src",
-    "../mackrl-skirmish/src",
-    "../mackrl-skirmish/maps",
-    "../mackrl-skirmish/units",
+/// Folders that results come from, each as its crate's folder in the repository, its package, and its place within.
+const SOURCES: [(&str, &str, &str); 7] = [
+    ("mackrl", "mackrl-core", "src"),
+    ("mackrl-run", "mackrl-run", "src"),
+    ("mackrl-run", "mackrl-run", "presets"),
+    ("mackrl-env", "mackrl-env", "src"),
+    ("mackrl-skirmish", "mackrl-skirmish", "src"),
+    ("mackrl-skirmish", "mackrl-skirmish", "maps"),
+    ("mackrl-skirmish", "mackrl-skirmish", "units"),
 ];
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
+    let digits = hash_of_sources().unwrap_or_else(|| "unknown".to_owned());
+    println!("cargo::rustc-env=MACKRL_SOURCE={digits}");
+}
+
+/// The hash, the same in the repository and in unpacked packages of the same sources; nothing if a crate is not beside this one.
+fn hash_of_sources() -> Option<String> {
     let mut hasher = Sha256::new();
-    for folder in SOURCES.iter().map(Path::new).filter(|path| path.exists()) {
-        println!("cargo::rerun-if-changed={}", folder.display());
+    for (folder, package, place) in SOURCES {
+        let version = env!("CARGO_PKG_VERSION");
+        let beside = [format!("../{folder}"), format!("../{package}-{version}")];
+        let root =
+            (beside.iter().map(|name| Path::new(name).join(place))).find(|path| path.exists())?;
+        println!("cargo::rerun-if-changed={}", root.display());
         let mut files = Vec::new();
-        collect(folder, &mut files);
+        collect(&root, &mut files);
         files.sort();
         for file in files {
             let content = fs::read(&file).expect("a source file can be read");
-            hasher.update(file.to_string_lossy().replace('\\', "/"));
+            let name = file.strip_prefix(&root).expect("a file of the folder");
+            hasher.update(format!(
+                "{folder}/{place}/{}",
+                name.to_string_lossy().replace('\\', "/")
+            ));
             hasher.update((content.len() as u64).to_le_bytes());
             hasher.update(content);
         }
     }
     let hash = hasher.finalize();
-    let digits: String = hash[..6].iter().map(|byte| format!("{byte:02x}")).collect();
-    println!("cargo::rustc-env=MACKRL_SOURCE={digits}");
+    Some(hash[..6].iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
 /// Adds every file below `folder` that is not a test's.

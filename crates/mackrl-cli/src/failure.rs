@@ -45,6 +45,10 @@ pub(crate) enum Failure {
     /// A result of another version of this program, among which results of this one were to stand.
     OtherCode { path: PathBuf, code: String },
     /// StarCraft II is not as it has to be.
+    #[cfg_attr(
+        not(all(feature = "sc2", target_os = "linux")),
+        expect(dead_code, reason = "only the commands around the game make it")
+    )]
     NotReady {
         /// How much is wrong.
         problems: usize,

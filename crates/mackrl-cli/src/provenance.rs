@@ -182,6 +182,8 @@ pub(crate) fn hexadecimal(bytes: &[u8]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
 
     fn provenance(change: impl FnOnce(&mut Config)) -> Provenance {
@@ -239,10 +241,10 @@ mod tests {
     /// `cat maps/3m.toml units/liberty.toml | sha256sum`, and the same for the matrix game's payoffs.
     #[test]
     fn map_data_are_the_files_of_map_and_units() {
-        let files = concat!(
-            include_str!("../../mackrl-skirmish/maps/3m.toml"),
-            include_str!("../../mackrl-skirmish/units/liberty.toml")
-        );
+        let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../mackrl-skirmish");
+        let files: String = ["maps/3m.toml", "units/liberty.toml"]
+            .map(|file| std::fs::read_to_string(data.join(file)).unwrap())
+            .concat();
         assert_eq!(provenance(|_| ()).map_sha256, sha256(files.as_bytes()));
         let lotv = provenance(|config| {
             config.env.settings.units = mackrl_skirmish::UnitData::Lotv;

@@ -4,8 +4,6 @@ use std::process::Command;
 
 use serde_json::{Value, json};
 
-/// The table of the SMAC client.
-const SMAC_MAPS: &str = include_str!("../../mackrl-skirmish/tests/golden/smac_maps.md");
 /// Columns of the table, in their order.
 const COLUMNS: [&str; 14] = [
     "map",
@@ -23,6 +21,12 @@ const COLUMNS: [&str; 14] = [
     "max_reward",
     "scale",
 ];
+
+/// A file of the crate of the simulator.
+fn simulator_file(name: &str) -> String {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../mackrl-skirmish");
+    std::fs::read_to_string(format!("{folder}/{name}")).expect("the file is in the repository")
+}
 
 fn mackrl(words: &[&str]) -> Value {
     let output = Command::new(assert_cmd::cargo::cargo_bin("mackrl"))
@@ -77,7 +81,8 @@ fn line_of(map: &Value) -> Vec<String> {
 
 #[test]
 fn the_list_is_the_table_of_smac_in_every_column() {
-    let mut lines = SMAC_MAPS.lines().filter(|line| line.starts_with("| "));
+    let table = simulator_file("tests/golden/smac_maps.md");
+    let mut lines = table.lines().filter(|line| line.starts_with("| "));
     assert_eq!(cells(lines.next().expect("a heading")), COLUMNS);
     let expected: Vec<Vec<String>> = lines.map(cells).collect();
     let listed = mackrl(&["maps", "--json"]);
@@ -121,7 +126,7 @@ fn a_terrain_that_is_shown_can_be_put_into_a_scenario() {
     let map = mackrl(&["maps", "6h_vs_8z", "--json"]);
     let lines = map["terrain"].as_array().expect("lines").iter();
     let drawing: Vec<&str> = lines.map(|line| line.as_str().expect("a line")).collect();
-    let shipped = include_str!("../../mackrl-skirmish/maps/6h_vs_8z.toml");
+    let shipped = simulator_file("maps/6h_vs_8z.toml");
     let own = format!("terrain = \"\"\"\n{}\n\"\"\"", drawing.join("\n"));
     let text = shipped.replace("terrain = \"arena-6h\"", &own);
     assert_ne!(text, shipped);

@@ -1,5 +1,7 @@
 //! StarCraft II through its stand-in: real processes, real sockets, real faults, real signals.
 
+#![cfg(all(feature = "sc2", target_os = "linux"))]
+
 use std::{
     path::{Path, PathBuf},
     process::{Child, Command, Output, Stdio},

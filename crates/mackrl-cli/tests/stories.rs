@@ -295,8 +295,11 @@ fn a_map_is_shown_with_a_picture_and_the_matrix_game_without() {
 /// A copy of the commented example in a folder of its own.
 fn folder_with_example() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder for the story");
-    let example = include_str!("../../../examples/scenarios/sniper-alley.toml");
-    std::fs::write(folder.path().join("my.toml"), example).expect("the folder can be written");
+    let example = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../examples/scenarios/sniper-alley.toml"
+    );
+    std::fs::copy(example, folder.path().join("my.toml")).expect("the folder can be written");
     folder
 }
 
@@ -427,8 +430,11 @@ fn what_is_no_scenario_is_refused_at_once_whatever_it_is() {
 #[test]
 fn a_scenario_may_be_called_like_a_world_of_ours() {
     let folder = tempfile::tempdir().expect("a folder for the story");
-    let map = include_str!("../../mackrl-skirmish/maps/2m_vs_1z.toml");
-    std::fs::write(folder.path().join("matrix-game.toml"), map).expect("writable");
+    let map = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../mackrl-skirmish/maps/2m_vs_1z.toml"
+    );
+    std::fs::copy(map, folder.path().join("matrix-game.toml")).expect("writable");
     let checked = type_in_folder("maps --check matrix-game.toml --json", folder.path());
     let checked: serde_json::Value =
         serde_json::from_str(&checked.succeeds()).expect("a JSON array");

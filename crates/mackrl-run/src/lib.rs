@@ -8,3 +8,8 @@ pub mod replay;
 pub mod training;
 
 pub use mackrl::{Error, NotFinite};
+
+/// Compiles and runs the examples of README.md.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct ReadmeExamples;

@@ -1,4 +1,4 @@
-//! What a step of pairwise MACKRL costs beside its environment: `cargo bench -p mackrl --bench hierarchy`.
+//! What a step of pairwise MACKRL costs beside its environment: `cargo bench -p mackrl-core --bench hierarchy`.
 //!
 //! Everything is measured in the middle of a battle, where agents see each other and some enemies.
 

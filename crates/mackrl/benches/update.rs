@@ -1,4 +1,4 @@
-//! Learning, on one thread: `cargo bench -p mackrl --bench update`.
+//! Learning, on one thread: `cargo bench -p mackrl-core --bench update`.
 //!
 //! 80 rows are 8 environments with 10 pairs, as `2s3z` has; 24 are those of `3m`, and 12 those of one of its shards.
 

@@ -32,8 +32,3 @@ pub mod tabular;
 pub use error::{Broken, Error, Moment, NotFinite};
 pub use real::Real;
 pub use stopwatch::{Phase, Stopwatch};
-
-/// Compiles and runs the examples of README.md.
-#[cfg(doctest)]
-#[doc = include_str!("../../../README.md")]
-struct ReadmeExamples;

@@ -7,6 +7,10 @@ mod inquiry;
 mod play;
 mod replay;
 mod runs;
+#[cfg(all(feature = "sc2", target_os = "linux"))]
+mod sc2;
+#[cfg(not(all(feature = "sc2", target_os = "linux")))]
+#[path = "without_sc2.rs"]
 mod sc2;
 mod serve;
 mod sweep;
@@ -28,12 +32,14 @@ pub(crate) use bench::{
 };
 pub(crate) use configuration::{ConfigurationArgs, read_scenario, with_scenario, world};
 pub(crate) use inquiry::DiffArgs;
-pub(crate) use play::{PlayArgs, PolicyChoice};
+pub(crate) use play::PlayArgs;
 pub(crate) use replay::{ExplainArgs, ReplayArgs};
 pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, TrainArgs};
+pub(crate) use sc2::Sc2Args;
+#[cfg(all(feature = "sc2", target_os = "linux"))]
 pub(crate) use sc2::{
-    DoctorArgs, ExecGameArgs, InstallArgs, KillArgs, PsArgs, RecordArgs, Sc2Args, Sc2Command,
-    ServeArgs, UnitsChoice,
+    DoctorArgs, ExecGameArgs, InstallArgs, KillArgs, PsArgs, RecordArgs, Sc2Command, ServeArgs,
+    UnitsChoice,
 };
 pub(crate) use serve::ServeRunsArgs;
 pub(crate) use sweep::SweepArgs;

@@ -4,7 +4,7 @@ use std::{net::IpAddr, num::NonZeroU64, path::PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
 
-use crate::args::PolicyChoice;
+use super::play::PolicyChoice;
 
 /// Play on StarCraft II itself, or let StarCraft's clients play on the built-in simulator
 ///

@@ -14,6 +14,10 @@ pub(crate) mod replay;
 pub(crate) mod report;
 pub(crate) mod reproduce;
 pub(crate) mod resume;
+#[cfg(all(feature = "sc2", target_os = "linux"))]
+pub(crate) mod sc2;
+#[cfg(not(all(feature = "sc2", target_os = "linux")))]
+#[path = "without_sc2.rs"]
 pub(crate) mod sc2;
 pub(crate) mod serve;
 pub(crate) mod sweep;

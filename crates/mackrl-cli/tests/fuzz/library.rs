@@ -14,7 +14,14 @@ use mackrl_skirmish::{SkirmishSettings, scripted::ScriptedPolicy};
 
 use crate::{Target, mutation};
 
-const EXAMPLE: &str = include_str!("../../../../examples/scenarios/sniper-alley.toml");
+/// The commented example of a scenario.
+fn example() -> String {
+    let file = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../examples/scenarios/sniper-alley.toml"
+    );
+    std::fs::read_to_string(file).expect("the example is in the repository")
+}
 
 /// The text of a configuration.
 pub(crate) struct Configuration;
@@ -79,11 +86,12 @@ impl Target for Scenario {
     }
 
     fn seeds(&self) -> Vec<Vec<u8>> {
-        vec![EXAMPLE.as_bytes().to_vec()]
+        vec![example().into_bytes()]
     }
 
     fn words(&self) -> Vec<String> {
-        let words = EXAMPLE.split(|c: char| c.is_whitespace() || "=[]{},".contains(c));
+        let example = example();
+        let words = example.split(|c: char| c.is_whitespace() || "=[]{},".contains(c));
         words
             .filter(|word| word.len() > 2)
             .map(str::to_owned)

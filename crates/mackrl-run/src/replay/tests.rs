@@ -267,9 +267,13 @@ fn whatever_a_stranger_changes_nothing_panics() {
 
 #[test]
 fn in_figure_1_two_agents_commonly_know_what_both_see_and_the_third_stands_apart() {
+    let file = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../examples/scenarios/figure1.toml"
+    );
     let mut env = EnvironmentConfig {
         map: "folder/figure1.toml".to_owned(),
-        scenario: include_str!("../../../../examples/scenarios/figure1.toml").to_owned(),
+        scenario: std::fs::read_to_string(file).unwrap(),
         ..EnvironmentConfig::default()
     };
     (env.settings.sight_range, env.settings.shoot_range) = (6.0, 4.0);

@@ -1,9 +1,17 @@
+use std::sync::LazyLock;
+
 use proptest::prelude::*;
 
 use super::*;
 use crate::UnitData;
 
-const EXAMPLE: &str = include_str!("../../../../examples/scenarios/sniper-alley.toml");
+static EXAMPLE: LazyLock<String> = LazyLock::new(|| {
+    let file = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../examples/scenarios/sniper-alley.toml"
+    );
+    std::fs::read_to_string(file).unwrap()
+});
 
 fn read(text: &str) -> Result<Scenario, ScenarioProblem> {
     let units = UnitTypes::load(UnitData::Liberty).unwrap();
@@ -19,7 +27,7 @@ fn problem(from: &str, to: &str) -> String {
 
 #[test]
 fn the_example_has_its_own_terrain_and_unit() {
-    let scenario = read(EXAMPLE).unwrap();
+    let scenario = read(&EXAMPLE).unwrap();
     let sniper = scenario
         .field
         .profiles
@@ -169,7 +177,8 @@ fn text_that_nests_or_repeats_without_end_is_refused() {
             .contains("expected at most")
     );
     let many = format!(
-        "{EXAMPLE}\n{}",
+        "{}\n{}",
+        *EXAMPLE,
         "[[unit]]\nname = \"x\"\nlike = \"marine\"\n".repeat(99)
     );
     assert!(
