@@ -9,6 +9,7 @@ use std::{
 };
 
 use dashboard::Dashboard;
+use mackrl::nn::InstructionSet;
 use terminal_size::{Height, Width, terminal_size_of};
 
 const TERMINAL_INTERVAL: Duration = Duration::from_millis(500);
@@ -125,6 +126,14 @@ impl Progress {
             Style::Plain => write_stderr(&format!("{line}\n")),
         }
     }
+}
+
+/// Tells what a run computes with, before it begins.
+pub(crate) fn announce(instructions: InstructionSet, threads: usize) {
+    let s = if threads == 1 { "" } else { "s" };
+    write_stderr(&format!(
+        "computing with {instructions} on {threads} thread{s}\n"
+    ));
 }
 
 fn is_due(style: Style, shown: Instant, now: Instant) -> bool {

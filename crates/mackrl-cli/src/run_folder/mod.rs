@@ -34,6 +34,7 @@ use std::{
 use anyhow::Context;
 use checkpoints::Surroundings;
 use disk::{Disk, RealDisk, cannot, cannot_write};
+use mackrl::nn::InstructionSet;
 use mackrl_run::{
     config::Config,
     training::{Checkpoint, assembly::tensors_bytes_max},
@@ -84,6 +85,9 @@ struct RunRecord {
     provenance: Vec<Provenance>,
     /// Threads in use, which change no result.
     threads: usize,
+    /// Instruction set in use, which changes no result.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    simd: Option<String>,
     status: Status,
     /// Why the run cannot go on, if it cannot.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -256,10 +260,12 @@ impl RunFolder {
             command: std::env::args().collect(),
             provenance: Vec::new(),
             threads,
+            simd: None,
             status: Status::Running,
             refusal: None,
         });
         record.threads = threads;
+        record.simd = Some(InstructionSet::chosen()?.name().to_owned());
         record.refusal = None;
         let provenance = Provenance::of_run(config);
         if !record.provenance.contains(&provenance) {
