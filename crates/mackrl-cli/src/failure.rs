@@ -7,7 +7,7 @@ use std::{
     process::ExitCode,
 };
 
-use mackrl::NotFinite;
+use mackrl::{NotFinite, nn::UnknownInstructionSet};
 use mackrl_env::StepError;
 use mackrl_run::config::{Config, ConfigError};
 
@@ -253,7 +253,7 @@ fn exit_of(cause: &(dyn std::error::Error + 'static)) -> Option<Exit> {
             _ => Exit::Defect,
         });
     }
-    if cause.is::<ConfigError>() {
+    if cause.is::<ConfigError>() || cause.is::<UnknownInstructionSet>() {
         return Some(Exit::Configuration);
     }
     cause.is::<io::Error>().then_some(Exit::InputOutput)

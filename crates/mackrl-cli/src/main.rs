@@ -26,10 +26,14 @@ mod training_loop;
 use std::process::ExitCode;
 
 use clap::Parser;
+use mackrl::nn::InstructionSet;
 
 use crate::args::{Cli, Command};
 
 fn main() -> ExitCode {
+    if let Err(error) = InstructionSet::chosen() {
+        return failure::report(Err(error.into()));
+    }
     let outcome = match Cli::parse().command {
         Command::Train(args) => commands::train::run(&args),
         Command::Resume(args) => commands::resume::run(&args),

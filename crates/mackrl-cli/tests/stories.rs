@@ -17,13 +17,20 @@ fn type_in(line: &str) -> Story {
 }
 
 fn type_in_folder(line: &str, folder: &std::path::Path) -> Story {
-    let output = Command::cargo_bin("mackrl")
-        .expect("the program is built")
+    outcome(line, program(line, folder))
+}
+
+fn program(line: &str, folder: &std::path::Path) -> Command {
+    let mut program = Command::cargo_bin("mackrl").expect("the program is built");
+    program
         .args(line.split_whitespace())
         .current_dir(folder)
-        .env_remove("COLUMNS")
-        .output()
-        .expect("the program starts");
+        .env_remove("COLUMNS");
+    program
+}
+
+fn outcome(line: &str, mut program: Command) -> Story {
+    let output = program.output().expect("the program starts");
     let text = |bytes| String::from_utf8(bytes).expect("output is UTF-8");
     Story {
         typed: line.to_owned(),
@@ -79,6 +86,51 @@ fn help_teaches_every_command() {
         help += &type_in(&format!("{command} --help")).succeeds();
     }
     insta::assert_snapshot!("help", help);
+}
+
+/// Types `line` where `MACKRL_SIMD` is `instructions`.
+fn type_in_with(instructions: &str, line: &str, folder: &std::path::Path) -> Story {
+    let mut program = program(line, folder);
+    program.env("MACKRL_SIMD", instructions);
+    outcome(line, program)
+}
+
+#[test]
+fn instructions_that_cannot_be_had_are_refused_before_anything_else() {
+    let folder = tempfile::tempdir().expect("a folder for the story");
+    for line in ["--version", "maps", "train --map 3m --steps 1"] {
+        let error = type_in_with("avx1024", line, folder.path()).fails(64);
+        let start = "error: MACKRL_SIMD=avx1024: expected scalar";
+        assert!(error.starts_with(start), "{error}");
+    }
+    assert_eq!(
+        std::fs::read_dir(folder.path()).expect("a folder").count(),
+        0
+    );
+}
+
+#[test]
+fn the_instruction_set_is_named_wherever_speed_is_told() {
+    let folder = tempfile::tempdir().expect("a folder for the story");
+    let json = |text: &str| serde_json::from_str::<serde_json::Value>(text).expect("JSON");
+    for set in mackrl::nn::InstructionSet::available().map(mackrl::nn::InstructionSet::name) {
+        let tell = |line: &str| type_in_with(set, line, folder.path());
+        let version = tell("--version").succeeds();
+        assert_eq!(version.lines().nth(1), Some(&*format!("simd {set}")));
+        for bench in [
+            "update --rows 2 --steps 3",
+            "env --map 3m --steps 5",
+            "train --map 3m --steps 1",
+        ] {
+            let speed = json(&tell(&format!("bench {bench} --json")).succeeds());
+            assert_eq!(speed["simd"], set, "bench {bench}");
+        }
+        let trained = tell(&format!("train --map 3m --steps 1 --threads 1 --out {set}"));
+        let first = trained.stderr.lines().next();
+        assert_eq!(first, Some(&*format!("computing with {set} on 1 thread")));
+        let record = std::fs::read_to_string(folder.path().join(set).join("run.json"));
+        assert_eq!(json(&record.expect("a record"))["simd"], set);
+    }
 }
 
 #[test]

@@ -15,9 +15,10 @@ mod sc2;
 mod serve;
 mod sweep;
 
-use std::path::PathBuf;
+use std::{path::PathBuf, sync::LazyLock};
 
 use clap::{Args, Parser, Subcommand};
+use mackrl::nn::InstructionSet;
 
 use crate::{
     provenance::CODE,
@@ -53,10 +54,19 @@ pub(crate) use sweep::SweepArgs;
 /// difference, 2 usage, 64 a bad
 /// configuration, 65 bad data, 70 a defect of this program, 74 input or output, 75 stopped by a signal: go on with `mackrl resume`.
 #[derive(Debug, Parser)]
-#[command(name = "mackrl", version = CODE, max_term_width = 100)]
+#[command(name = "mackrl", version = CODE, long_version = long_version(), max_term_width = 100)]
 pub(crate) struct Cli {
     #[command(subcommand)]
     pub(crate) command: Command,
+}
+
+/// What `--version` tells: the version, and the instructions that this machine computes with.
+fn long_version() -> &'static str {
+    static TEXT: LazyLock<String> = LazyLock::new(|| {
+        let simd = InstructionSet::chosen().map_or("none", InstructionSet::name);
+        format!("{CODE}\nsimd {simd}")
+    });
+    &TEXT
 }
 
 #[derive(Debug, Subcommand)]

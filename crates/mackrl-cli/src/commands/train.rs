@@ -2,11 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use mackrl::nn::InstructionSet;
 use mackrl_run::{config::Config, training::Trainer};
 
 use crate::{
     args::TrainArgs,
     commands::sc2,
+    progress,
     run_folder::RunFolder,
     signals::StopRequest,
     training_loop::{self, Reporting},
@@ -25,6 +27,7 @@ pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<()> {
         &stop,
     );
     let mut folder = RunFolder::create(&path, &config, threads)?;
+    progress::announce(InstructionSet::chosen()?, threads);
     let summary = training_loop::train_into(&mut folder, &mut training, &config, &stop)?;
     training_loop::print(&summary, args.json)
 }

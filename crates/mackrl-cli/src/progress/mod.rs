@@ -5,6 +5,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use mackrl::nn::InstructionSet;
+
 const TERMINAL_INTERVAL: Duration = Duration::from_millis(500);
 const PLAIN_INTERVAL: Duration = Duration::from_secs(30);
 
@@ -83,6 +85,14 @@ impl Progress {
             Style::Plain => write_stderr(&format!("{line}\n")),
         }
     }
+}
+
+/// Tells what a run computes with, before it begins.
+pub(crate) fn announce(instructions: InstructionSet, threads: usize) {
+    let s = if threads == 1 { "" } else { "s" };
+    write_stderr(&format!(
+        "computing with {instructions} on {threads} thread{s}\n"
+    ));
 }
 
 fn is_due(style: Style, shown: Instant, now: Instant) -> bool {

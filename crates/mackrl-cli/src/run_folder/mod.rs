@@ -32,6 +32,7 @@ use std::{
 use anyhow::Context;
 use checkpoints::Surroundings;
 use disk::{Disk, RealDisk, cannot, cannot_write};
+use mackrl::nn::InstructionSet;
 use mackrl_run::{
     config::Config,
     training::{Checkpoint, assembly::tensors_bytes_max},
@@ -81,6 +82,9 @@ struct RunRecord {
     provenance: Vec<Provenance>,
     /// Threads in use, which change no result.
     threads: usize,
+    /// Instruction set in use, which changes no result.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    simd: Option<String>,
     status: Status,
 }
 
@@ -229,9 +233,11 @@ impl RunFolder {
             command: std::env::args().collect(),
             provenance: Vec::new(),
             threads,
+            simd: None,
             status: Status::Running,
         });
         record.threads = threads;
+        record.simd = Some(InstructionSet::chosen()?.name().to_owned());
         let provenance = Provenance::of_run(config);
         if !record.provenance.contains(&provenance) {
             record.provenance.push(provenance);

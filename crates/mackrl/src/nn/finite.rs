@@ -51,7 +51,7 @@ pub(super) fn holds_broken<R: Real>(values: &[R]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::nn::lanes::forced::{Width, with_width};
+    use crate::nn::instructions::{InstructionSet, on};
 
     #[test]
     fn the_first_broken_number_is_found() {
@@ -72,9 +72,9 @@ mod tests {
                 let mut numbers = vec![f32::MAX; 1063];
                 numbers[place] = broken;
                 assert_eq!(first_not_finite(&numbers), Some(place), "{broken}");
-                for width in [Width::Scalar, Width::Avx2] {
-                    let found = with_width(width, || first_not_finite(&numbers));
-                    assert_eq!(found, Some(place), "{broken} {width:?}");
+                for set in InstructionSet::available() {
+                    let found = on(set, || first_not_finite(&numbers));
+                    assert_eq!(found, Some(place), "{broken} {set}");
                 }
             }
         }

@@ -1,12 +1,15 @@
 //! Lanes: one kernel source for every width of vector, and for `f64`.
 //!
-//! A [`Kernel`] is written over [`Lanes`], a handful of lane-wise operations. [`Element::dispatch`] runs it with the widest
-//! instructions that the machine has (through the `pulp` crate, which keeps the code free of `unsafe`), and for `f64` one
-//! number at a time. No operation here combines lanes, so a result never depends on how many there are.
+//! A [`Kernel`] is written over [`Lanes`], a handful of lane-wise operations. [`Element::dispatch`] runs it with the
+//! instructions that were [chosen](crate::nn::InstructionSet) (through the `pulp` crate, which keeps the code free of
+//! `unsafe`), and for `f64` one number at a time. No operation here combines lanes, so a result never depends on how many there are.
 
 use pulp::Simd;
 
-use crate::{Real, nn::elementary};
+use crate::{
+    Real,
+    nn::{elementary, instructions},
+};
 
 /// The number of columns to which reductions and packed matrices are padded; every width divides it.
 pub(crate) const BLOCK: usize = 16;
@@ -82,18 +85,17 @@ pub trait Kernel<E> {
 
 /// A number that networks can be computed in: `f32`, or `f64` for tests.
 pub trait Element: Real {
-    /// Runs a kernel with the best instructions of this machine.
+    /// Runs a kernel with the instructions of [`InstructionSet::chosen`](crate::nn::InstructionSet::chosen).
+    ///
+    /// # Panics
+    /// If those cannot be had.
     fn dispatch<K: Kernel<Self>>(kernel: K) -> K::Output;
 }
 
 impl Element for f32 {
     #[inline]
     fn dispatch<K: Kernel<Self>>(kernel: K) -> K::Output {
-        #[cfg(test)]
-        if let Some(width) = forced::width() {
-            return forced::dispatch(width, kernel);
-        }
-        pulp::Arch::new().dispatch(Vectorised(kernel))
+        instructions::dispatch(kernel)
     }
 }
 
@@ -104,21 +106,9 @@ impl Element for f64 {
     }
 }
 
-/// Lets `pulp` run a kernel.
-struct Vectorised<K>(K);
-
-impl<K: Kernel<f32>> pulp::WithSimd for Vectorised<K> {
-    type Output = K::Output;
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> K::Output {
-        self.0.run(Vectors(simd))
-    }
-}
-
 /// Vectors of `f32`.
 #[derive(Clone, Copy)]
-struct Vectors<S>(S);
+pub(super) struct Vectors<S>(pub(super) S);
 
 impl<S: Simd> Lanes for Vectors<S> {
     type Element = f32;
@@ -234,49 +224,5 @@ impl Lanes for OneByOne {
     }
     fn sigmoid(self, x: f64) -> f64 {
         1.0 / (1.0 + (-x).exp())
-    }
-}
-
-/// Lets tests choose the width, to show that it changes no bit.
-#[cfg(test)]
-pub(crate) mod forced {
-    use std::cell::Cell;
-
-    use super::{Kernel, Vectorised};
-
-    /// A width of vector.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-    pub(crate) enum Width {
-        /// One number at a time.
-        Scalar,
-        /// AVX2, where the machine has it; else one number at a time.
-        Avx2,
-    }
-
-    thread_local! {
-        static WIDTH: Cell<Option<Width>> = const { Cell::new(None) };
-    }
-
-    pub(crate) fn width() -> Option<Width> {
-        WIDTH.get()
-    }
-
-    /// Computes something with every kernel on this thread forced to `width`.
-    pub(crate) fn with_width<T>(width: Width, compute: impl FnOnce() -> T) -> T {
-        WIDTH.set(Some(width));
-        let result = compute();
-        WIDTH.set(None);
-        result
-    }
-
-    pub(super) fn dispatch<K: Kernel<f32>>(width: Width, kernel: K) -> K::Output {
-        #[cfg(target_arch = "x86_64")]
-        if width == Width::Avx2
-            && let Some(simd) = pulp::x86::V3::try_new()
-        {
-            return pulp::Simd::vectorize(simd, Vectorised(kernel));
-        }
-        let _ = width;
-        pulp::Arch::Scalar.dispatch(Vectorised(kernel))
     }
 }

@@ -12,8 +12,8 @@
 //! sigmoid and logarithm are our own sequences of fused operations, the same on every width, and a sum over columns has a fixed
 //! number of partial sums. Sums over *rows* occur in gradients only.
 //!
-//! The code is written once over [`Real`](crate::Real): `f32` runs on SIMD instructions chosen at run time (AVX-512, AVX2,
-//! NEON, or none), `f64` runs the same kernels one number at a time, for the tests against finite differences.
+//! The code is written once over [`Real`](crate::Real): `f32` runs on SIMD instructions chosen at run time
+//! ([`InstructionSet`]: AVX-512, AVX2, NEON, or none), `f64` runs the same kernels one number at a time, for the tests against finite differences.
 
 mod aligned;
 pub mod benchmark;
@@ -22,6 +22,7 @@ mod feed_forward;
 mod finite;
 mod gates;
 mod gru;
+mod instructions;
 mod lanes;
 mod linear;
 mod optimiser;
@@ -38,6 +39,7 @@ mod weight_gradient;
 pub use feed_forward::{FeedForward, FeedForwardTrace, FeedForwardWeights};
 pub use finite::first_not_finite;
 pub use gru::Gru;
+pub use instructions::{InstructionSet, UnknownInstructionSet};
 pub use lanes::Element;
 pub use linear::Linear;
 pub use optimiser::{BrokenStep, Moments, Optimiser, OptimiserKind, Stepped, clip_gradient_norm};

@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use mackrl::nn::InstructionSet;
 use mackrl_env::{StepError, random_play::RandomPlay};
 use mackrl_run::config::ConfigBuilder;
 use serde::Serialize;
@@ -18,6 +19,7 @@ const PARTS: u64 = 5;
 #[derive(Debug, Serialize)]
 struct EnvironmentSpeed {
     map: String,
+    simd: &'static str,
     threads: usize,
     steps: u64,
     episodes: u64,
@@ -46,7 +48,7 @@ pub(super) fn run(args: &BenchEnvironmentArgs) -> anyhow::Result<()> {
         })
     });
     let players = players.collect::<Result<Vec<_>, mackrl::Error>>()?;
-    let speed = measure(players, args.steps.get())?;
+    let speed = measure(players, args.steps.get(), InstructionSet::chosen()?)?;
     if args.json {
         return output::print_json(&speed);
     }
@@ -64,7 +66,11 @@ pub(super) fn run(args: &BenchEnvironmentArgs) -> anyhow::Result<()> {
     ])
 }
 
-fn measure(mut players: Vec<Player>, steps: u64) -> Result<EnvironmentSpeed, StepError> {
+fn measure(
+    mut players: Vec<Player>,
+    steps: u64,
+    instructions: InstructionSet,
+) -> Result<EnvironmentSpeed, StepError> {
     let mut parts = Vec::new();
     for part in 0..PARTS {
         let steps = share(steps, part, PARTS);
@@ -77,6 +83,7 @@ fn measure(mut players: Vec<Player>, steps: u64) -> Result<EnvironmentSpeed, Ste
     let rates = parts.iter().map(|&(steps, wall)| rate(steps, wall));
     Ok(EnvironmentSpeed {
         map: players[0].play.environment().spec().name.clone(),
+        simd: instructions.name(),
         threads: players.len(),
         steps,
         episodes: players.iter().map(|player| player.play.episodes()).sum(),

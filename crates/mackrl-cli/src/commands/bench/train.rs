@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, time::Instant};
 
-use mackrl::Phase;
+use mackrl::{Phase, nn::InstructionSet};
 use mackrl_run::training::Trainer;
 use serde::Serialize;
 
@@ -20,6 +20,7 @@ struct TrainingSpeed {
     map: String,
     algorithm: String,
     preset: String,
+    simd: &'static str,
     threads: usize,
     steps: u64,
     wall_s: f64,
@@ -36,6 +37,7 @@ pub(super) fn run(args: &BenchTrainArgs) -> anyhow::Result<()> {
     let mut rows = vec![
         ("map", speed.map),
         ("algorithm", speed.algorithm),
+        ("instruction set", speed.simd.to_owned()),
         ("threads", speed.threads.to_string()),
         ("environment steps", speed.steps.to_string()),
         ("seconds", format!("{:.3}", speed.wall_s)),
@@ -73,6 +75,7 @@ fn measure(args: &BenchTrainArgs) -> anyhow::Result<TrainingSpeed> {
             .and_then(|name| name.as_str().map(str::to_owned))
             .unwrap_or_default(),
         preset: typed.preset.clone(),
+        simd: InstructionSet::chosen()?.name(),
         threads,
         steps: trainer.steps_env(),
         wall_s,

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use mackrl::nn::{NetworkSizes, benchmark::UpdateProbe};
+use mackrl::nn::{InstructionSet, NetworkSizes, benchmark::UpdateProbe};
 use serde::Serialize;
 
 use super::print_rows;
@@ -13,6 +13,7 @@ const WARM_UP: usize = 3;
 
 #[derive(Debug, Serialize)]
 struct UpdateSpeed {
+    simd: &'static str,
     rows: usize,
     steps: usize,
     inputs: usize,
@@ -28,11 +29,12 @@ struct UpdateSpeed {
 }
 
 pub(super) fn run(args: &BenchUpdateArgs) -> anyhow::Result<()> {
-    let speed = measure(args);
+    let speed = measure(args, InstructionSet::chosen()?);
     if args.json {
         return output::print_json(&speed);
     }
     print_rows(&[
+        ("instruction set", speed.simd.to_owned()),
         ("rows", speed.rows.to_string()),
         ("steps", speed.steps.to_string()),
         ("updates", speed.updates.to_string()),
@@ -46,7 +48,7 @@ pub(super) fn run(args: &BenchUpdateArgs) -> anyhow::Result<()> {
     ])
 }
 
-fn measure(args: &BenchUpdateArgs) -> UpdateSpeed {
+fn measure(args: &BenchUpdateArgs, instructions: InstructionSet) -> UpdateSpeed {
     let sizes = UpdateProbe::PAIR_CONTROLLER;
     let (rows, steps) = (args.rows.get(), args.steps.get());
     let mut probe = UpdateProbe::new(sizes, rows, steps);
@@ -68,6 +70,7 @@ fn measure(args: &BenchUpdateArgs) -> UpdateSpeed {
     } = sizes;
     let gflop = 1e-9 * UpdateProbe::flop(sizes, rows, steps);
     UpdateSpeed {
+        simd: instructions.name(),
         rows,
         steps,
         inputs,

@@ -2,8 +2,8 @@
 
 use super::{SIZES, network, numbers};
 use crate::nn::{
-    MaskedLogSoftmax, NetworkSizes, Retention, Trace,
-    lanes::forced::{Width, with_width},
+    InstructionSet, MaskedLogSoftmax, NetworkSizes, Optimiser, OptimiserKind, Retention, Trace,
+    clip_gradient_norm, instructions::on,
 };
 
 const STEPS: usize = 3;
@@ -64,16 +64,59 @@ fn a_row_alone_equals_the_row_in_any_batch_at_any_position() {
 }
 
 #[test]
-fn every_width_of_vector_gives_the_same_bits() {
+fn every_instruction_set_gives_the_same_bits() {
     for sizes in [SIZES, WIDE] {
         for (rows, position) in [(1, 0), (7, 3), (13, 12)] {
-            let widest = row_results(sizes, rows, position, Retention::Episode);
-            for width in [Width::Scalar, Width::Avx2] {
-                let narrow = with_width(width, || {
+            let chosen = row_results(sizes, rows, position, Retention::Episode);
+            for set in InstructionSet::available() {
+                let results = on(set, || {
                     row_results(sizes, rows, position, Retention::Episode)
                 });
-                assert_eq!(narrow, widest, "{width:?}, row {position} of {rows}");
+                assert_eq!(results, chosen, "{set}, row {position} of {rows}");
             }
+        }
+    }
+}
+
+/// The parameters after two updates of each rule, and the norms of their gradients.
+fn learned(sizes: NetworkSizes, rows: usize) -> Vec<u64> {
+    let (network, initial, _) = network::<f32>(sizes);
+    let mut trace = Trace::new(sizes, Retention::Episode);
+    let mut gradient = vec![0.0; initial.len()];
+    let mut results = Vec::new();
+    for kind in [OptimiserKind::ADAM, OptimiserKind::RMSPROP] {
+        let mut optimiser = Optimiser::new(kind, initial.len());
+        let mut parameters = initial.clone();
+        for update in 0..2 {
+            let weights = network.weights(&parameters);
+            trace.begin_episode();
+            for t in 0..STEPS {
+                trace.begin_step(rows, None);
+                let inputs = numbers::<f32>(rows * sizes.inputs, 10 * update + t);
+                trace.input_mut().copy_from_slice(&inputs);
+                network.step(&weights, &mut trace);
+            }
+            for t in 0..STEPS {
+                let of_logits = numbers::<f32>(rows * sizes.outputs, 100 + 10 * update + t);
+                trace.logits_gradient_mut(t).copy_from_slice(&of_logits);
+            }
+            gradient.fill(0.0);
+            network.backward(&weights, &mut trace, &mut gradient);
+            results.push(clip_gradient_norm(&mut gradient, 1.0).to_bits());
+            optimiser.step(0.01, &gradient, &mut parameters);
+        }
+        results.extend(parameters.iter().map(|value| u64::from(value.to_bits())));
+    }
+    results
+}
+
+#[test]
+fn every_instruction_set_learns_the_same_bits() {
+    for (sizes, rows) in [(SIZES, 5), (WIDE, 83)] {
+        let chosen = learned(sizes, rows);
+        for set in InstructionSet::available() {
+            let results = on(set, || learned(sizes, rows));
+            assert_eq!(results, chosen, "{set}, {rows} rows");
         }
     }
 }
