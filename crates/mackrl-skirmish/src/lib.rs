@@ -9,6 +9,7 @@ pub mod custom;
 mod encounter;
 pub mod error;
 mod face;
+pub mod fidelity;
 mod paths;
 mod registry;
 pub mod rules;
