@@ -11,6 +11,9 @@ pub enum SkirmishError {
     /// A file of unit statistics is broken.
     #[error("unit statistics: {0}")]
     UnitFile(String),
+    /// The file of what the real game does is broken.
+    #[error("reference values of the real game: {0}")]
+    ReferenceFile(String),
     /// A map file is broken.
     #[error("map `{map}`: {problem}")]
     MapFile {

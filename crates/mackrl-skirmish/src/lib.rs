@@ -9,6 +9,7 @@ pub mod custom;
 mod encounter;
 pub mod error;
 mod face;
+pub mod fidelity;
 mod kind;
 mod paths;
 mod registry;

@@ -9,12 +9,13 @@ use mackrl_env::{
 
 use crate::{
     Encounter,
+    actions::STOP,
     error::SkirmishError,
     face::{
         layout::Layout,
         view::{BattleTally, Face},
     },
-    rules::{Battle, Chance, UnitIndex},
+    rules::{Battle, Chance, Order, UnitIndex},
     scenario::Scenario,
     settings::SkirmishSettings,
 };
@@ -85,6 +86,32 @@ impl Skirmish {
         self.battle().state().hash()
     }
 
+    /// Plays a step by orders instead of actions, available or not: agents without one go on with what they do.
+    pub(crate) fn command(
+        &mut self,
+        orders: &[Option<Order>],
+        out: &mut ObservationMut<'_>,
+    ) -> TimeStep {
+        for (agent, order) in orders.iter().enumerate() {
+            if let Some(order) = order {
+                let agent = UnitIndex::try_from(agent).expect("a battle has ≤ 256 units");
+                self.encounter.order(agent, *order);
+            }
+        }
+        let actions = vec![Action::new(STOP); orders.len()];
+        self.play(&actions, out)
+    }
+
+    /// Plays the loops of a step under the orders that everybody has.
+    fn play(&mut self, actions: &[Action], out: &mut ObservationMut<'_>) -> TimeStep {
+        let mut chance = Chance::new(self.key, self.face.steps() + 1);
+        for _ in 0..self.face.settings().step_mul {
+            self.encounter.advance(&mut chance);
+        }
+        let state = self.encounter.battle().state();
+        self.face.settle(state, actions, out)
+    }
+
     fn order_agents(&mut self, actions: &[Action]) {
         for (agent, action) in actions.iter().enumerate() {
             let order = self
@@ -120,12 +147,7 @@ impl Environment for Skirmish {
     ) -> Result<TimeStep, StepError> {
         self.face.check(self.encounter.battle().state(), actions)?;
         self.order_agents(actions);
-        let mut chance = Chance::new(self.key, self.face.steps() + 1);
-        for _ in 0..self.face.settings().step_mul {
-            self.encounter.advance(&mut chance);
-        }
-        let state = self.encounter.battle().state();
-        Ok(self.face.settle(state, actions, out))
+        Ok(self.play(actions, out))
     }
 
     fn statistics(&self) -> EpisodeStatistics {

@@ -74,7 +74,7 @@ impl Battle {
     }
 
     /// Whether `target` lives and the weapon of `index`, if it has one, reaches such units.
-    pub(super) fn can_attack(&self, index: usize, target: usize) -> bool {
+    pub(crate) fn can_attack(&self, index: usize, target: usize) -> bool {
         let (unit, other) = (&self.state.units[index], &self.state.units[target]);
         let strike = &self.field.profiles[usize::from(unit.kind)].strike;
         other.is_alive()

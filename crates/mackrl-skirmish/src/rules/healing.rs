@@ -9,7 +9,7 @@ use crate::rules::{Battle, Battlefield, Care, Order, Stance, combat::small};
 
 impl Battle {
     /// Whether `target` is a living friend that is hurt and that `index`, if it is a healer, can treat.
-    pub(super) fn can_heal(&self, index: usize, target: usize) -> bool {
+    pub(crate) fn can_heal(&self, index: usize, target: usize) -> bool {
         let (unit, other) = (&self.state.units[index], &self.state.units[target]);
         let profiles = &self.field.profiles;
         let care = &profiles[usize::from(unit.kind)].care;
