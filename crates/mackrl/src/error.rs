@@ -28,6 +28,12 @@ pub enum Error {
     Step(#[from] mackrl_env::StepError),
 }
 
+impl From<mackrl_env::WorldError> for Error {
+    fn from(error: mackrl_env::WorldError) -> Self {
+        Self::Config(error.to_string())
+    }
+}
+
 /// A number that is infinite or NaN, and where it turned up.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct NotFinite {

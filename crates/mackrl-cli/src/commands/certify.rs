@@ -47,7 +47,7 @@ fn certify(folder: &Path, run: &Run, args: &CertifyArgs) -> anyhow::Result<Certi
             )
         })
         .collect::<anyhow::Result<Vec<_>>>()?;
-    let mut environment = world.environments(1)?.remove(0);
+    let mut environment = world.environments(1).remove(0);
     let mut subject = Subject {
         policy: &*policy,
         weights: &weights,

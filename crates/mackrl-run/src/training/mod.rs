@@ -16,8 +16,8 @@ mod weights;
 
 pub use checkpoint::Checkpoint;
 pub use comparison::{Difference, compare_tensors};
-pub use evaluation::{Episodes, Evaluation, evaluate, evaluate_in};
+pub use evaluation::{Episodes, Evaluation, Quantity, evaluate, evaluate_in};
 pub use examination::{Examination, Part, TensorStatistics};
-pub use metrics::{METRICS, MetricRow};
+pub use metrics::{METRICS, MetricRow, headline, of_statistics};
 pub use trainer::Trainer;
 pub use weights::{read_weights, write_weights};

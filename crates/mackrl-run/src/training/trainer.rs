@@ -12,7 +12,7 @@ use mackrl::{
     policy::{Behaviour, Recording, Tally},
     rollout::{Episode, Rollout, RolloutSettings},
 };
-use mackrl_env::{EpisodeKey, Stream};
+use mackrl_env::{EpisodeKey, Statistic, Stream};
 
 use super::{
     Checkpoint, Evaluation, MetricRow, assembly,
@@ -73,13 +73,13 @@ impl Trainer {
         threads: usize,
     ) -> Result<Self, Error> {
         let policy = assembly::policy(config, world)?;
-        let environments = world.environments(config.learner.environments)?;
+        let environments = world.environments(config.learner.environments);
         let sizes = [world.spec().agents, world.spec().state_size];
         let settings = assembly::learner(config);
         Ok(Self {
             learner: Learner::new(&*policy, sizes, settings, config.run.seed, threads),
             rollout: Rollout::new(&*policy, environments, SHARD_SIZE, threads),
-            evaluator: Evaluator::new(&*policy, world, config.test.episodes, threads)?,
+            evaluator: Evaluator::new(&*policy, world, config.test.episodes, threads),
             world: world.clone(),
             policy,
             config: config.clone(),
@@ -233,6 +233,7 @@ impl Trainer {
             policy: self.policy.layout(),
             critic: self.learner.critic().layout(),
             optimiser: assembly::learner(&self.config).optimiser,
+            statistics: &self.world.spec().statistics,
         }
     }
 
@@ -288,7 +289,8 @@ impl Trainer {
         for episode in self.rollout.batches().flat_map(|batch| &batch.episodes) {
             self.steps_env += episode.steps() as u64;
             self.experience.add(episode);
-            self.interval.note_episode(episode);
+            self.interval
+                .note_episode(episode, &self.world.spec().statistics);
         }
         self.interval.note_update(&report, exploration);
         self.interval.tally.merge(&self.rollout.tally());
@@ -338,9 +340,9 @@ impl Trainer {
             played => (played / every + 1) * every,
         };
         let mut row = MetricRow::default();
-        row.push("t_env", self.steps_env as f64);
-        row.push("episode", self.episodes as f64);
-        row.push("update", self.learner.updates() as f64);
+        row.push_count("t_env", self.steps_env);
+        row.push_count("episode", self.episodes);
+        row.push_count("update", self.learner.updates());
         row.set_experience_hash(self.experience.0);
         interval
             .tally
@@ -355,10 +357,10 @@ impl Trainer {
         }
         let discarded = self.rollout.discarded() + self.evaluator.discarded();
         if discarded > 0 {
-            row.push("sys/episodes_discarded", discarded as f64);
+            row.push_count("sys/episodes_discarded", discarded);
         }
-        for (name, count) in self.world.source().counts() {
-            row.push(name, count as f64);
+        for counter in self.world.source().counters() {
+            row.push_count(format!("sys/{}", counter.name), counter.value);
         }
         row
     }
@@ -382,18 +384,13 @@ impl Interval {
         }
     }
 
-    fn note_episode(&mut self, episode: &Episode) {
-        let statistics = episode.statistics;
+    fn note_episode(&mut self, episode: &Episode, statistics: &[Statistic]) {
         let tally = &mut self.tally;
         tally.add("return_mean", episode.total_reward(), 1.0);
         tally.add("ep_length_mean", episode.steps() as f64, 1.0);
-        tally.add(
-            "battle_won_mean",
-            f64::from(u8::from(statistics.battle_won)),
-            1.0,
-        );
-        tally.add("dead_allies_mean", statistics.dead_allies as f64, 1.0);
-        tally.add("dead_enemies_mean", statistics.dead_enemies as f64, 1.0);
+        for (statistic, value) in statistics.iter().zip(&episode.statistics_s) {
+            tally.add(format!("{}_mean", statistic.name), *value, 1.0);
+        }
     }
 
     fn note_update(&mut self, report: &UpdateReport, exploration: f64) {
@@ -410,11 +407,9 @@ impl Interval {
 }
 
 fn append_test(row: &mut MetricRow, evaluation: &Evaluation) {
-    row.push("test_battle_won_mean", evaluation.test_battle_won_mean);
-    row.push("test_return_mean", evaluation.test_return_mean);
-    row.push("test_ep_length_mean", evaluation.test_ep_length_mean);
-    row.push("test_dead_allies_mean", evaluation.test_dead_allies_mean);
-    row.push("test_dead_enemies_mean", evaluation.test_dead_enemies_mean);
+    for quantity in &evaluation.quantities {
+        row.push(format!("test_{}_mean", quantity.name), quantity.mean);
+    }
     let delegation = evaluation.controllers.iter();
     for (name, value) in delegation.filter(|(name, _)| name.contains("delegation")) {
         row.push(format!("test_{name}"), *value);

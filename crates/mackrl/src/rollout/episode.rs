@@ -1,6 +1,6 @@
 //! What the learner needs of an episode, stored once.
 
-use mackrl_env::{EpisodeEnd, EpisodeStatistics, Observations};
+use mackrl_env::{EpisodeEnd, Observations};
 
 use crate::policy::Recording;
 
@@ -13,8 +13,8 @@ pub struct Episode {
     pub reward_t: Vec<f32>,
     /// Why the episode ended; `None` while it runs.
     pub end: Option<EpisodeEnd>,
-    /// How it ended.
-    pub statistics: EpisodeStatistics,
+    /// How it ended \[S\], in the order in which the world declares its statistics; empty while it runs.
+    pub statistics_s: Vec<f64>,
 }
 
 impl Episode {
@@ -48,7 +48,7 @@ impl Episode {
         self.state_tg.clear();
         self.reward_t.clear();
         self.end = None;
-        self.statistics = EpisodeStatistics::default();
+        self.statistics_s.clear();
     }
 
     /// Appends the state of environment `b`, if it will be needed.

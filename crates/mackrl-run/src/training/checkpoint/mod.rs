@@ -18,6 +18,7 @@ use mackrl::{
     nn::{Moments, OptimiserKind, ParameterLayout},
     policy::Tally,
 };
+use mackrl_env::Statistic;
 use serde::{Deserialize, Serialize};
 
 use super::{metrics::is_explained, read_weights, write_weights};
@@ -69,6 +70,8 @@ pub(super) struct Layouts<'a> {
     pub(super) policy: &'a ParameterLayout,
     pub(super) critic: &'a ParameterLayout,
     pub(super) optimiser: OptimiserKind,
+    /// What the world declares.
+    pub(super) statistics: &'a [Statistic],
 }
 
 /// The JSON object.
@@ -137,7 +140,7 @@ impl Checkpoint {
     }
 
     pub(super) fn read(&self, layouts: &Layouts<'_>) -> Result<State, Error> {
-        let numbers = self.numbers()?;
+        let numbers = self.numbers(layouts.statistics)?;
         let read = |layout: &ParameterLayout| read_weights(layout, &self.tensors);
         let moments = |layout: &ParameterLayout, steps| {
             let [first, second] = layouts.moments(layout);
@@ -172,7 +175,7 @@ impl Checkpoint {
         })
     }
 
-    fn numbers(&self) -> Result<Numbers, Error> {
+    fn numbers(&self, statistics: &[Statistic]) -> Result<Numbers, Error> {
         let broken = |error| Error::Data(format!("counters of the checkpoint: {error}"));
         let Format { format } = serde_json::from_slice(&self.counters).map_err(broken)?;
         if format != FORMAT {
@@ -181,14 +184,14 @@ impl Checkpoint {
             )));
         }
         let numbers: Numbers = serde_json::from_slice(&self.counters).map_err(broken)?;
-        numbers.check()?;
+        numbers.check(statistics)?;
         Ok(numbers)
     }
 }
 
 impl Numbers {
     /// Refuses what no run can have counted.
-    fn check(&self) -> Result<(), Error> {
+    fn check(&self, statistics: &[Statistic]) -> Result<(), Error> {
         let Counters {
             steps_env,
             episodes,
@@ -231,7 +234,10 @@ impl Numbers {
                 "checkpoint counts {found} as `{name}`, expected at most {most}"
             )));
         }
-        match interval.names().find(|name| !is_explained(name)) {
+        let unknown = interval
+            .names()
+            .find(|name| !is_explained(name, statistics));
+        match unknown {
             Some(name) => Err(Error::Data(format!(
                 "checkpoint holds an unknown metric `{name}`"
             ))),
