@@ -142,8 +142,8 @@ fn every_map_is_the_simulators_to_the_bit_restarts_included() {
                 if expected.expect("an available action").end.is_some() {
                     assert!(simulated == played, "{map}, episode {episode}, at its end");
                     assert_eq!(
-                        skirmish.statistics(),
-                        game.statistics(),
+                        skirmish.battle_statistics(),
+                        game.battle_statistics(),
                         "{map}, episode {episode}"
                     );
                     break;

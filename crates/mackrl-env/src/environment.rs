@@ -5,12 +5,12 @@
 //! starts* (the map, the ranges, everybody's field of view) is an object of its own, [`PriorKnowledge`], which a decentralised
 //! agent owns without owning a world.
 
-use std::{fmt::Debug, sync::Arc};
+use std::{borrow::Cow, fmt::Debug, sync::Arc};
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::{Action, AgentId, EntityId, EpisodeKey, KnownEntities, ObservationMut};
+use crate::{Action, AgentId, EntityId, EntitySet, EpisodeKey, KnownEntities, ObservationMut};
 
 /// Sizes of an environment's arrays and its time limit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -19,7 +19,7 @@ pub struct EnvironmentSpec {
     pub name: String,
     /// N: agents, at least 1. They are the first N entities.
     pub agents: usize,
-    /// M: everything that can be seen, at most [`crate::EntitySet::CAPACITY`].
+    /// M: everything that can be seen, at most [`EntitySet::CAPACITY`].
     pub entities: usize,
     /// F: features of an entity. The first two are its position (x, y) in map units; the others are attributes of about
     /// unit size.
@@ -34,6 +34,120 @@ pub struct EnvironmentSpec {
     pub episode_limit: usize,
     /// Map units by which relative positions are divided to become network inputs (the sight range in StarCraft), > 0.
     pub distance_scale: f32,
+    /// What an episode is reported by, in the order in which [`Environment::statistics`] writes it.
+    pub statistics: Vec<Statistic>,
+    /// Index in `statistics` of the one that says how far an episode succeeded, in [0, 1], if one does: reports show it
+    /// first. Without one, they show the return.
+    pub success: Option<usize>,
+}
+
+impl EnvironmentSpec {
+    /// The statistic that says how far an episode succeeded, if one does.
+    #[must_use]
+    pub fn success(&self) -> Option<&Statistic> {
+        self.statistics.get(self.success?)
+    }
+
+    /// Whether such a world can be played in.
+    ///
+    /// # Errors
+    /// [`InvalidSpec`] says which size is impossible, what was found and what was expected.
+    pub fn validate(&self) -> Result<(), InvalidSpec> {
+        let most_entities = EntitySet::CAPACITY;
+        let ids = usize::from(u16::MAX);
+        let count = |what, found: usize, least: usize, most: usize| {
+            let fits = (least..=most).contains(&found);
+            let expected = || format!("{least} to {most}");
+            (!fits).then(|| self.invalid(what, found.to_string(), expected()))
+        };
+        let sizes = [
+            count("entities", self.entities, 1, most_entities),
+            count("agents", self.agents, 1, self.entities),
+            count("features of an entity", self.entity_features, 1, ids),
+            count("actions", self.actions, 1, ids),
+            count("steps of an episode", self.episode_limit, 1, usize::MAX),
+        ];
+        if let Some(wrong) = sizes.into_iter().flatten().next() {
+            return Err(wrong);
+        }
+        if !(self.distance_scale.is_finite() && self.distance_scale > 0.0) {
+            let found = self.distance_scale.to_string();
+            return Err(self.invalid("distance_scale", found, "a finite number > 0".to_owned()));
+        }
+        self.validate_statistics()
+    }
+
+    fn validate_statistics(&self) -> Result<(), InvalidSpec> {
+        /// What is reported of the episodes of every world.
+        const COMMON: [&str; 2] = ["return", "ep_length"];
+        for (index, Statistic { name, .. }) in self.statistics.iter().enumerate() {
+            let is_word = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+            let is_name = !name.is_empty() && name.chars().all(is_word);
+            let is_taken = COMMON.contains(&&**name) || self.statistic(name) != Some(index);
+            if !is_name || is_taken {
+                let expected = "lower-case letters, digits and `_`, and a name of its own";
+                return Err(self.invalid("a statistic", format!("`{name}`"), expected.to_owned()));
+            }
+        }
+        match self.success {
+            Some(index) if index >= self.statistics.len() => {
+                let expected = format!("less than {}", self.statistics.len());
+                Err(self.invalid("the index of success", index.to_string(), expected))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn invalid(&self, what: &'static str, found: String, expected: String) -> InvalidSpec {
+        InvalidSpec {
+            world: self.name.clone(),
+            what,
+            found,
+            expected,
+        }
+    }
+
+    /// Index among the statistics of the one called `name`.
+    #[must_use]
+    pub fn statistic(&self, name: &str) -> Option<usize> {
+        self.statistics
+            .iter()
+            .position(|statistic| statistic.name == name)
+    }
+}
+
+/// Sizes that no world can have.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+#[error("world `{world}`: {what}: {found}, expected {expected}")]
+pub struct InvalidSpec {
+    /// Name of the world.
+    pub world: String,
+    /// Which size.
+    pub what: &'static str,
+    /// What it is.
+    pub found: String,
+    /// What it may be.
+    pub expected: String,
+}
+
+/// A number that a world reports of an episode; agents never see it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Statistic {
+    /// Name, such as `battle_won`, in lower case; metrics of runs are called `battle_won_mean` and `test_battle_won_mean`.
+    pub name: Cow<'static, str>,
+    /// What it is in one episode, such as "1 if the team has won, else 0".
+    pub meaning: Cow<'static, str>,
+}
+
+impl Statistic {
+    /// Declares one.
+    #[must_use]
+    pub fn new(name: impl Into<Cow<'static, str>>, meaning: impl Into<Cow<'static, str>>) -> Self {
+        Self {
+            name: name.into(),
+            meaning: meaning.into(),
+        }
+    }
 }
 
 /// Why an episode is over.
@@ -53,17 +167,6 @@ pub struct TimeStep {
     pub reward: f32,
     /// Set if this was the episode's last step.
     pub end: Option<EpisodeEnd>,
-}
-
-/// How an episode stands, for reports; agents never see it.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct EpisodeStatistics {
-    /// Whether the team has won.
-    pub battle_won: bool,
-    /// Agents that have died.
-    pub dead_allies: usize,
-    /// Enemies that have died.
-    pub dead_enemies: usize,
 }
 
 /// An action that was not available to its agent. The world has not moved.
@@ -125,8 +228,11 @@ pub trait Environment: Send {
         out: &mut ObservationMut<'_>,
     ) -> Result<TimeStep, StepError>;
 
-    /// How the current episode stands.
-    fn statistics(&self) -> EpisodeStatistics;
+    /// Writes how the current episode stands, for reports.
+    ///
+    /// # Shapes
+    /// `statistics_s` \[S\], in the order of [`EnvironmentSpec::statistics`]; all finite.
+    fn statistics(&self, statistics_s: &mut [f64]);
 }
 
 /// What is common knowledge before the game starts (τ₀ in the paper): everybody's field of view and the rules of availability.
@@ -154,4 +260,56 @@ pub trait PriorKnowledge: Send + Sync + Debug {
 
     /// The action by which an agent acts on `entity`, if there is one (attack this enemy).
     fn action_on(&self, entity: EntityId) -> Option<Action>;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn spec() -> EnvironmentSpec {
+        EnvironmentSpec {
+            name: "maze".to_owned(),
+            agents: 3,
+            entities: 128,
+            entity_features: 2,
+            actions: 5,
+            observation_size: 0,
+            state_size: 0,
+            episode_limit: 1,
+            distance_scale: 1.0,
+            statistics: vec![Statistic::new("found", "1 if the way was found, else 0")],
+            success: Some(0),
+        }
+    }
+
+    #[test]
+    fn sizes_that_no_world_can_have_are_refused_in_words() {
+        assert_eq!(spec().validate(), Ok(()));
+        assert_eq!(spec().success(), Some(&spec().statistics[0]));
+        let refused = |change: fn(&mut EnvironmentSpec), expected: &str| {
+            let mut spec = spec();
+            change(&mut spec);
+            assert_eq!(spec.validate().unwrap_err().to_string(), expected);
+        };
+        refused(
+            |spec| spec.entities = 129,
+            "world `maze`: entities: 129, expected 1 to 128",
+        );
+        refused(
+            |spec| spec.agents = 129,
+            "world `maze`: agents: 129, expected 1 to 128",
+        );
+        refused(
+            |spec| spec.distance_scale = 0.0,
+            "world `maze`: distance_scale: 0, expected a finite number > 0",
+        );
+        refused(
+            |spec| spec.statistics.push(Statistic::new("found", "again")),
+            "world `maze`: a statistic: `found`, expected lower-case letters, digits and `_`, and a name of its own",
+        );
+        refused(
+            |spec| spec.success = Some(1),
+            "world `maze`: the index of success: 1, expected less than 1",
+        );
+    }
 }

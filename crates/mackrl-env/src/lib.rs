@@ -25,8 +25,8 @@ mod world;
 
 pub use entity_set::EntitySet;
 pub use environment::{
-    Environment, EnvironmentSpec, EpisodeEnd, EpisodeStatistics, IllegalAction, Interruption,
-    PriorKnowledge, StepError, TimeStep,
+    Environment, EnvironmentSpec, EpisodeEnd, IllegalAction, Interruption, InvalidSpec,
+    PriorKnowledge, Statistic, StepError, TimeStep,
 };
 pub use ids::{Action, AgentId, EntityId};
 pub use observations::{KnownEntities, LocalView, ObservationMut, Observations};

@@ -15,7 +15,7 @@ use std::{
 use thiserror::Error;
 
 use crate::{
-    Environment, EnvironmentSpec, PriorKnowledge,
+    Environment, EnvironmentSpec, InvalidSpec, PriorKnowledge,
     settings::{Setting, SettingsError},
 };
 
@@ -103,6 +103,9 @@ pub enum WorldError {
         /// Where in the text, what was found and what was expected.
         problem: String,
     },
+    /// It is larger than can be played in, or declares itself wrongly.
+    #[error(transparent)]
+    Invalid(#[from] InvalidSpec),
     /// Something is missing or broken that no setting can mend.
     #[error("{0}")]
     Unavailable(String),
@@ -119,14 +122,17 @@ pub struct Prototype<E> {
 
 impl<E: Environment> Prototype<E> {
     /// The world of `environment`, of which nothing has been played yet; `kind` is the name of its kind.
-    #[must_use]
-    pub fn new(kind: impl Into<Cow<'static, str>>, environment: E) -> Self {
-        Self {
+    ///
+    /// # Errors
+    /// [`WorldError::Invalid`] if its sizes are none that a world can have.
+    pub fn new(kind: impl Into<Cow<'static, str>>, environment: E) -> Result<Self, WorldError> {
+        environment.spec().validate()?;
+        Ok(Self {
             kind: kind.into(),
             version: Cow::Borrowed("1"),
             data: Cow::Borrowed(""),
             environment,
-        }
+        })
     }
 
     /// With another [`World::version`] than 1.

@@ -252,7 +252,7 @@ fn the_client_observes_and_is_paid_what_the_simulator_says_restarts_included() {
                 skirmish.reset(key, row);
             } else {
                 let step = skirmish.step(&shown.actions(), row).unwrap();
-                comparison.payment(shown, step, skirmish.statistics().battle_won);
+                comparison.payment(shown, step, skirmish.battle_statistics().battle_won);
             }
             comparison.with(shown);
         }

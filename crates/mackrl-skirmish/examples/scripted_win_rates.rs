@@ -45,7 +45,7 @@ fn play(environment: &mut Skirmish, policy: ScriptedPolicy, episodes: u64) -> [f
                 break;
             }
         }
-        sums[0] += f64::from(u8::from(environment.statistics().battle_won));
+        sums[0] += f64::from(u8::from(environment.battle_statistics().battle_won));
     }
     sums.map(|sum| sum / episodes as f64)
 }

@@ -79,6 +79,17 @@ impl PlaceSettings {
         make(&self.map, settings).map_err(WorldError::from)
     }
 
+    /// The world of the skirmish that is played here under `settings`.
+    ///
+    /// # Errors
+    /// As [`PlaceSettings::skirmish`].
+    pub fn world(&self, settings: &SkirmishSettings) -> Result<Arc<dyn World>, WorldError> {
+        let world = Prototype::new(SKIRMISH, self.skirmish(settings)?)?
+            .version(SIMULATOR_VERSION.to_string())
+            .data(self.data(settings));
+        Ok(Arc::new(world))
+    }
+
     /// The data that the skirmish is made of, as text: the map's file or the scenario, then the file of unit statistics.
     #[must_use]
     pub fn data(&self, settings: &SkirmishSettings) -> String {
@@ -112,10 +123,7 @@ impl WorldKind for SkirmishKind {
 
     fn build(&self, table: &toml::Table) -> Result<Arc<dyn World>, WorldError> {
         let (place, settings) = Self::read(table)?;
-        let world = Prototype::new(SKIRMISH, place.skirmish(&settings)?)
-            .version(SIMULATOR_VERSION.to_string())
-            .data(place.data(&settings));
-        Ok(Arc::new(world))
+        place.world(&settings)
     }
 }
 
@@ -150,9 +158,9 @@ impl From<SkirmishError> for WorldError {
                 setting: "scenario".to_owned(),
                 problem: error.to_string(),
             },
-            SkirmishError::UnitFile(_) | SkirmishError::MapFile { .. } => {
-                Self::Unavailable(error.to_string())
-            }
+            SkirmishError::UnitFile(_)
+            | SkirmishError::MapFile { .. }
+            | SkirmishError::ReferenceFile(_) => Self::Unavailable(error.to_string()),
         }
     }
 }

@@ -22,7 +22,7 @@ pub mod unit_types;
 
 pub use encounter::Encounter;
 pub use error::SkirmishError;
-pub use face::{BattleTally, Face, Layout, Skirmish, SkirmishKnowledge};
+pub use face::{BattleStatistics, BattleTally, Face, Layout, Skirmish, SkirmishKnowledge};
 pub use kind::{PlaceSettings, SKIRMISH, SkirmishKind};
 pub use registry::{MakeError, make, make_custom, map_names};
 pub use scenario::Scenario;

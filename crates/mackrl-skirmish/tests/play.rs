@@ -45,7 +45,7 @@ fn fare(name: &str, policy: ScriptedPolicy, episodes: u64) -> (u64, f64) {
         play(&mut skirmish, policy, episode, |_, _, reward| {
             total += f64::from(reward);
         });
-        won += u64::from(skirmish.statistics().battle_won);
+        won += u64::from(skirmish.battle_statistics().battle_won);
     }
     (won, total / episodes as f64)
 }
@@ -125,8 +125,10 @@ fn a_won_battle_returns_20_and_what_grew_back_besides() {
                     episode,
                     |skirmish, _, reward| {
                         total += f64::from(reward);
-                        let (left, killed) =
-                            (strength(skirmish), skirmish.statistics().dead_enemies);
+                        let (left, killed) = (
+                            strength(skirmish),
+                            skirmish.battle_statistics().dead_enemies,
+                        );
                         let gain = before - left + 10.0 * (killed - dead) as f64;
                         // SMAC takes the absolute value, so that what grows back in a step pays too, and is paid for again when
                         // it is shot off; the clean reward is paid for that alone.
@@ -134,7 +136,7 @@ fn a_won_battle_returns_20_and_what_grew_back_besides() {
                         (before, dead) = (left, killed);
                     },
                 );
-                if skirmish.statistics().battle_won {
+                if skirmish.battle_statistics().battle_won {
                     wins += 1;
                     regenerated += usize::from(grown > 0.0);
                     // A battle is won too when a medivac is all that is left.

@@ -130,7 +130,7 @@ fn enemies_that_hunt_find_a_team_that_hides_and_those_of_the_map_do_not() {
                 break;
             }
         }
-        let dead = skirmish.statistics().dead_allies;
+        let dead = skirmish.battle_statistics().dead_allies;
         assert_eq!(dead == 3, found, "{enemy_order:?}: {dead} dead");
     }
 }

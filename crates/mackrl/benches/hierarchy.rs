@@ -93,7 +93,7 @@ impl Scene {
             .expect("a map of this program");
         let world = World::new(&config).expect("a world of this program");
         let policy = assembly::policy(&config, &world).expect("a policy of this program");
-        let environments = world.environments(ENVIRONMENTS).expect("as above");
+        let environments = world.environments(ENVIRONMENTS);
         let agents = world.spec().agents;
         let episodes = 0..ENVIRONMENTS as u64;
         let mut scene = Self {

@@ -36,7 +36,7 @@ fn learner(criterion: &mut Criterion) {
     let config = Config::default();
     let world = World::new(&config).expect("3m is a map of this program");
     let policy = assembly::policy(&config, &world).expect("as above");
-    let environments = world.environments(ENVIRONMENTS).expect("as above");
+    let environments = world.environments(ENVIRONMENTS);
     let sizes = [world.spec().agents, world.spec().state_size];
     let mut learner = Learner::new(&*policy, sizes, assembly::learner(&config), 1, 1);
     let mut rollout = Rollout::new(&*policy, environments, SHARD_SIZE, 1);

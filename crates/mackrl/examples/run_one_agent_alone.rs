@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .collect();
     alone.iter_mut().for_each(|(_, executor)| executor.begin());
 
-    let mut environment = world.environments(1)?.remove(0);
+    let mut environment = world.environments(1).remove(0);
     let mut observations = Observations::new(world.spec(), 1);
     environment.reset(key, &mut observations.row_mut(0));
     let mut action_n = vec![Action::default(); world.spec().agents];

@@ -35,6 +35,12 @@ impl Error {
     }
 }
 
+impl From<mackrl_env::WorldError> for Error {
+    fn from(error: mackrl_env::WorldError) -> Self {
+        Self::Config(error.to_string())
+    }
+}
+
 /// A number that is infinite or NaN, and where it turned up.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct NotFinite {

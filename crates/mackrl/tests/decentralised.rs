@@ -93,7 +93,7 @@ fn certify<P: Policy + ?Sized>(
         .map(|executor| Box::new(InProcessAgent::new(executor, &weights)) as Box<dyn AgentLink>)
         .collect();
     let disguised = disguise(assembly::policy(config, &world).unwrap());
-    let mut environment = world.environments(1).unwrap().remove(0);
+    let mut environment = world.environments(1).remove(0);
     let mut subject = Subject {
         policy: central(&disguised),
         weights: &weights,
@@ -179,7 +179,7 @@ fn agents_with_another_seed_are_caught_with_the_input_that_differs() {
         .map(|agent| policy.executor(AgentId::new(agent)))
         .map(|executor| Box::new(InProcessAgent::new(executor, &others)) as Box<dyn AgentLink>)
         .collect();
-    let mut environment = world.environments(1).unwrap().remove(0);
+    let mut environment = world.environments(1).remove(0);
     let mut subject = Subject {
         policy: &*policy,
         weights: &weights,
@@ -202,7 +202,7 @@ fn agents_with_another_seed_are_caught_with_the_input_that_differs() {
 #[test]
 fn a_view_by_value_holds_what_is_seen_and_nothing_else() {
     let world = World::new(&config(&["env.map=2s3z"])).unwrap();
-    let mut environment = world.environments(1).unwrap().remove(0);
+    let mut environment = world.environments(1).remove(0);
     let mut observations = Observations::new(world.spec(), 1);
     let key = EpisodeKey::new(1, Stream::Other, 0);
     environment.reset(key, &mut observations.row_mut(0));

@@ -32,15 +32,17 @@ fn a_team_learns_to_win_three_marines_against_three() {
         "test.interval_steps_env=80000",
     ]);
     let evaluation = train_and_evaluate(&config, 160);
-    let won = evaluation.test_battle_won_mean;
+    let won = evaluation
+        .mean("battle_won")
+        .expect("a statistic of battles");
     assert!(won >= 0.9, "won {won}");
     let untrained = Config::default();
     let trainer = Trainer::new(&untrained, 1).expect("a run that can begin");
     let before = evaluate(&untrained, &trainer.weights(), 32, 1, 1).expect("its own weights");
+    let before = before.mean("battle_won").expect("a statistic of battles");
     assert!(
-        before.test_battle_won_mean < 0.1,
-        "no learning is needed: an untrained team wins {}",
-        before.test_battle_won_mean
+        before < 0.1,
+        "no learning is needed: an untrained team wins {before}"
     );
 }
 
@@ -51,7 +53,8 @@ fn every_seed_and_both_algorithms_learn_to_win_three_marines_against_three() {
         for seed in ["run.seed=1", "run.seed=2", "run.seed=3"] {
             let settings = ["env.map=3m", "env.spawn_scatter=0", "run.steps_env=300000"];
             let config = config(&[&settings[..], &[algorithm, seed]].concat());
-            let won = train_and_evaluate(&config, 320).test_battle_won_mean;
+            let won = train_and_evaluate(&config, 320).mean("battle_won");
+            let won = won.expect("a statistic of battles");
             assert!(won >= 0.9, "{algorithm}, {seed}: won {won}");
         }
     }
@@ -88,7 +91,9 @@ fn networks_play_the_matrix_game_better_than_both_tabular_baselines() {
             "test.interval_steps_env=40000",
             seed,
         ]);
-        let found = train_and_evaluate(&config, 4000).test_return_mean;
+        let found = train_and_evaluate(&config, 4000)
+            .mean("return")
+            .expect("of every world");
         let margin = 0.02;
         assert!(
             found > joint + margin && found > independent + margin,

@@ -107,9 +107,11 @@ fn check(settings: &[&str], episodes: u64, h: f64) -> Subject {
 #[test]
 fn the_gradient_of_whole_episodes_is_that_of_their_log_probability() {
     let subject = check(&["env.map=3m"], 3, 1e-3);
-    let deaths = |episode: &Episode| episode.statistics.dead_allies;
+    let dead_allies = subject.team.world.spec().statistic("dead_allies");
+    let dead_allies = dead_allies.expect("a statistic of battles");
+    let deaths = |episode: &Episode| episode.statistics_s[dead_allies];
     assert!(
-        subject.played.episodes.iter().all(|e| deaths(e) > 0),
+        subject.played.episodes.iter().all(|e| deaths(e) > 0.0),
         "nobody dies"
     );
 }

@@ -7,8 +7,8 @@ use mackrl::{
     rollout::{Rollout, RolloutSettings},
 };
 use mackrl_env::{
-    Action, Environment, EnvironmentSpec, EpisodeKey, EpisodeStatistics, ObservationMut,
-    PriorKnowledge, StepError, Stream, TimeStep,
+    Action, Environment, EnvironmentSpec, EpisodeKey, ObservationMut, PriorKnowledge, StepError,
+    Stream, TimeStep,
 };
 use mackrl_run::{
     config::Config,
@@ -23,7 +23,7 @@ fn play(episodes: u64) -> Vec<usize> {
     let world = World::new(&config).unwrap();
     let policy = assembly::policy(&config, &world).unwrap();
     let weights = policy.weights(&policy.initialise(1));
-    let mut rollout = Rollout::new(&*policy, world.environments(5).unwrap(), 2, 1);
+    let mut rollout = Rollout::new(&*policy, world.environments(5), 2, 1);
     assert_eq!(rollout.environments(), 5);
     let settings = RolloutSettings {
         behaviour: Behaviour::GREEDY,
@@ -97,8 +97,8 @@ impl Environment for BrokenWorld {
         }
         Ok(step)
     }
-    fn statistics(&self) -> EpisodeStatistics {
-        self.world.statistics()
+    fn statistics(&self, statistics_s: &mut [f64]) {
+        self.world.statistics(statistics_s);
     }
 }
 
@@ -127,7 +127,7 @@ fn whatever_a_world_gives_that_is_not_finite_is_named_at_once() {
         ),
         (Flaw::State, "state is NaN at episode 3, step 3, feature 5"),
     ] {
-        let worlds = world.environments(4).unwrap().into_iter().enumerate();
+        let worlds = world.environments(4).into_iter().enumerate();
         let worlds = worlds.map(|(b, world)| {
             let flaw = (b == 3).then_some(flaw);
             Box::new(BrokenWorld {

@@ -46,7 +46,7 @@ fn certify(folder: &Path, run: &Run, args: &CertifyArgs) -> anyhow::Result<Certi
             )
         })
         .collect::<anyhow::Result<Vec<_>>>()?;
-    let mut environment = world.environments(1)?.remove(0);
+    let mut environment = world.environments(1).remove(0);
     let mut subject = Subject {
         policy: algorithm.policy(),
         parameters: algorithm.parameters(),

@@ -96,7 +96,7 @@ impl TrainingRun {
         let won = Measurements::read(&run, WON)?;
         let first_batch = Measurements::read(&run, PLAYED)?.steps.first().copied();
         let mut delegation = vec![Vec::new(); won.values.len()];
-        let world = run.config.env.make()?;
+        let world = run.config.env.world()?;
         let enemies = world.spec().entities - world.spec().agents;
         for enemies in 0..=enemies {
             let metric = format!("{DELEGATION}{enemies}");

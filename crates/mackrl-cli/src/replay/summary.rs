@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use mackrl_env::EpisodeStatistics;
+use mackrl_skirmish::BattleStatistics;
 use serde::Serialize;
 
 use super::Opened;
@@ -29,7 +29,7 @@ impl Summary {
         let Opened {
             replay, playback, ..
         } = opened;
-        let EpisodeStatistics {
+        let BattleStatistics {
             battle_won,
             dead_allies,
             dead_enemies,

@@ -14,9 +14,9 @@ use super::{
 };
 use crate::{
     Action, AgentId, Draw, EntityId, EntitySet, Environment, EnvironmentSpec, EpisodeEnd,
-    EpisodeKey, EpisodeStatistics, IllegalAction, KnownEntities, ObservationMut, PriorKnowledge,
-    Prototype, StepError, TimeStep, World, WorldError, WorldKind, declare_settings,
-    settings::{Accepts, Setting, Settings},
+    EpisodeKey, IllegalAction, KnownEntities, ObservationMut, PriorKnowledge, Prototype, Statistic,
+    StepError, TimeStep, World, WorldError, WorldKind, declare_settings,
+    settings::{Accepts, Setting, Settings, SettingsError},
 };
 
 const ENTITIES: usize = AGENTS + 1;
@@ -41,8 +41,8 @@ declare_settings! {
 
 /// The matrix game as a world of one step.
 ///
-/// Observations are one-hot over [`Observation`]. The state is the matrix, one-hot, then both observations. An episode counts
-/// as won if the team earned 1, the best payoff.
+/// Observations are one-hot over [`Observation`]. The state is the matrix, one-hot, then both observations. An episode
+/// succeeds if the team earned 1, the best payoff.
 #[derive(Debug, Clone)]
 pub struct MatrixGame {
     settings: MatrixGameSettings,
@@ -73,6 +73,11 @@ impl MatrixGame {
                 state_size: Matrix::ALL.len() + AGENTS * Observation::COUNT,
                 episode_limit: 1,
                 distance_scale: 1.0,
+                statistics: vec![Statistic::new(
+                    "best_payoff",
+                    "1 if the team earned 1, the best payoff, else 0",
+                )],
+                success: Some(0),
             },
             cards: DealtCards {
                 bit: false,
@@ -166,17 +171,30 @@ impl Environment for MatrixGame {
         })
     }
 
-    fn statistics(&self) -> EpisodeStatistics {
-        EpisodeStatistics {
-            battle_won: self.won,
-            ..EpisodeStatistics::default()
-        }
+    fn statistics(&self, statistics_s: &mut [f64]) {
+        statistics_s[0] = f64::from(u8::from(self.won));
     }
 }
 
 /// Matrix games as a kind of world.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct MatrixGameKind;
+
+impl MatrixGameKind {
+    /// The world of these settings.
+    ///
+    /// # Errors
+    /// [`WorldError`] if the probability of common knowledge is not in [0, 1].
+    pub fn world(settings: MatrixGameSettings) -> Result<Arc<dyn World>, WorldError> {
+        if let Some(violation) = settings.violation() {
+            return Err(SettingsError::from(violation).into());
+        }
+        let game = MatrixGame::new(settings)
+            .map_err(|error| WorldError::Unavailable(error.to_string()))?;
+        let world = Prototype::new(MATRIX_GAME, game)?.data(payoff_text(settings.payoffs));
+        Ok(Arc::new(world))
+    }
+}
 
 impl WorldKind for MatrixGameKind {
     fn name(&self) -> &str {
@@ -196,10 +214,7 @@ impl WorldKind for MatrixGameKind {
     }
 
     fn build(&self, table: &toml::Table) -> Result<Arc<dyn World>, WorldError> {
-        let settings = MatrixGameSettings::read(table)?;
-        let game = MatrixGame::new(settings).expect("the probability is in its range");
-        let world = Prototype::new(MATRIX_GAME, game).data(payoff_text(settings.payoffs));
-        Ok(Arc::new(world))
+        Self::world(MatrixGameSettings::read(table)?)
     }
 }
 
@@ -274,6 +289,12 @@ mod tests {
             error.to_string(),
             "setting `common_knowledge` is 1.5, expected a number in [0, 1]"
         );
+    }
+
+    fn best_payoff(game: &MatrixGame) -> f64 {
+        let mut statistics_s = [f64::NAN];
+        game.statistics(&mut statistics_s);
+        statistics_s[0]
     }
 
     /// Deals `episodes` games and hands each to `check`.
@@ -368,7 +389,7 @@ mod tests {
             action: Action::new(5),
         };
         assert_eq!(refused.unwrap_err(), expected.into());
-        assert!(!game.statistics().battle_won);
+        assert_eq!(best_payoff(&game), 0.0);
         let best = match game.cards().matrix {
             Matrix::A => [4, 4],
             Matrix::B => [4, 0],
@@ -377,6 +398,6 @@ mod tests {
             .step(&best.map(Action::new), &mut observations.row_mut(0))
             .unwrap();
         assert_eq!((step.reward, step.end), (1.0, Some(EpisodeEnd::Terminated)));
-        assert!(game.statistics().battle_won);
+        assert_eq!(best_payoff(&game), 1.0);
     }
 }

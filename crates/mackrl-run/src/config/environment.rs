@@ -1,12 +1,14 @@
 //! The world that is played in: a map by its name, and the settings that the map's world declares.
 
+use std::sync::Arc;
+
 use mackrl::Error;
 use mackrl_env::{
-    Environment,
-    matrix_game::{MATRIX_GAME, MatrixGame, MatrixGameSettings, payoff_text},
+    World,
+    matrix_game::{MATRIX_GAME, MatrixGameKind, MatrixGameSettings, payoff_text},
     settings::Accepts,
 };
-use mackrl_skirmish::{Skirmish, SkirmishSettings, scenario};
+use mackrl_skirmish::{PlaceSettings, Skirmish, SkirmishSettings};
 use serde::{Deserialize, Serialize};
 
 use crate::config::{ConfigError, Engine, Origin, Setting, settings::in_section};
@@ -120,23 +122,31 @@ impl EnvironmentConfig {
     ///
     /// # Errors
     /// [`Error::Config`] if the map is unknown, a setting is out of its range, or another engine is to play.
-    pub fn make(&self) -> Result<Box<dyn Environment>, Error> {
+    pub fn world(&self) -> Result<Arc<dyn World>, Error> {
         if self.engine != Engine::Simulator {
             let message = "env.engine is `sc2`, but only the built-in simulator can be used here";
             return Err(Error::Config(message.to_owned()));
         }
-        if self.is_matrix_game() {
-            return MatrixGame::new(self.matrix_game)
-                .map(|game| Box::new(game) as _)
-                .map_err(|error| Error::Config(error.to_string()));
+        let world = if self.is_matrix_game() {
+            MatrixGameKind::world(self.matrix_game)
+        } else {
+            self.place().world(&self.settings)
+        };
+        Ok(world?)
+    }
+
+    /// Where a skirmish is played.
+    fn place(&self) -> PlaceSettings {
+        PlaceSettings {
+            map: self.map.clone(),
+            scenario: self.scenario.clone(),
         }
-        Ok(Box::new(self.skirmish()?))
     }
 
     /// Builds the world as a skirmish, whose units can be looked at.
     ///
     /// # Errors
-    /// As [`EnvironmentConfig::make`], and [`Error::Config`] if the map is the matrix game, which has no units.
+    /// As [`EnvironmentConfig::world`], and [`Error::Config`] if the map is the matrix game, which has no units.
     pub fn skirmish(&self) -> Result<Skirmish, Error> {
         if self.scenario.is_empty() {
             mackrl_skirmish::make(&self.map, &self.settings)
@@ -150,12 +160,10 @@ impl EnvironmentConfig {
     /// matrix game its payoffs. Other settings stand in the configuration, everything else in the code.
     #[must_use]
     pub fn data(&self) -> String {
-        if !self.scenario.is_empty() {
-            return self.scenario.clone() + self.settings.units.text();
-        }
-        match scenario::map_text(&self.map) {
-            Some(map) => map.to_owned() + self.settings.units.text(),
-            None => payoff_text(self.matrix_game.payoffs),
+        if self.is_matrix_game() {
+            payoff_text(self.matrix_game.payoffs)
+        } else {
+            self.place().data(&self.settings)
         }
     }
 

@@ -213,7 +213,7 @@ impl Config {
         let world = self
             .env
             .simulated()
-            .make()
+            .world()
             .map_err(|error| ConfigError::Scenario {
                 message: error.to_string(),
             })?;

@@ -1,9 +1,7 @@
 //! A replay played again, with every state at hand.
 
-use mackrl_env::{
-    Action, AgentId, EntitySet, Environment, EpisodeEnd, EpisodeStatistics, Observations,
-};
-use mackrl_skirmish::{Skirmish, rules::BattleState};
+use mackrl_env::{Action, AgentId, EntitySet, Environment, EpisodeEnd, Observations};
+use mackrl_skirmish::{BattleStatistics, Skirmish, rules::BattleState};
 
 use super::{GroupKnowledge, Replay, ReplayError, Step, hexadecimal};
 
@@ -19,7 +17,7 @@ pub struct Playback {
     /// Why it ended; `None` if the recording stops before the end.
     pub end: Option<EpisodeEnd>,
     /// How it ended.
-    pub statistics: EpisodeStatistics,
+    pub statistics: BattleStatistics,
 }
 
 /// One moment of a battle.
@@ -47,7 +45,7 @@ impl Replay {
             moments: Vec::new(),
             reward_t: Vec::new(),
             end: None,
-            statistics: EpisodeStatistics::default(),
+            statistics: BattleStatistics::default(),
         };
         playback.begin(self, &mut observations);
         for (index, step) in self.steps.iter().enumerate() {
@@ -66,7 +64,7 @@ impl Replay {
                     },
                 })?;
         }
-        playback.statistics = playback.skirmish.statistics();
+        playback.statistics = playback.skirmish.battle_statistics();
         Ok(playback)
     }
 }

@@ -74,8 +74,11 @@ fn a_watched_greedy_episode_is_that_of_the_evaluation() {
     let replay = record_policy(&config, &weights, Behaviour::GREEDY, key).unwrap();
     let rewards = replay.play().unwrap().reward_t;
     let total: f64 = rewards.iter().map(|reward| f64::from(*reward)).sum();
-    assert_eq!(total, evaluation.test_return_mean);
-    assert_eq!(replay.steps.len() as f64, evaluation.test_ep_length_mean);
+    assert_eq!(Some(total), evaluation.mean("return"));
+    assert_eq!(
+        Some(replay.steps.len() as f64),
+        evaluation.mean("ep_length")
+    );
 }
 
 #[test]

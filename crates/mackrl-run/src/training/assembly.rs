@@ -1,56 +1,20 @@
 //! From a configuration to the objects that it describes.
 
-use std::{fmt::Debug, sync::Arc};
+use std::sync::Arc;
 
 use mackrl::{
     Error,
     algorithms::{self, Algorithm, Team},
 };
-use mackrl_env::{Environment, EnvironmentSpec, PriorKnowledge};
+use mackrl_env::{Environment, EnvironmentSpec, PriorKnowledge, WorldError};
 
 use super::StoredWeights;
-use crate::config::{Config, EnvironmentConfig};
+use crate::config::Config;
 
-/// Where the worlds of a run come from: the built-in simulator, or something outside this library that can fail.
-pub trait WorldSource: Send + Sync + Debug {
-    /// Builds the world that `config` describes.
-    ///
-    /// # Errors
-    /// [`Error::Config`] if it cannot be built.
-    fn make(&self, config: &EnvironmentConfig) -> Result<Box<dyn Environment>, Error>;
-
-    /// Worlds that may be played in at once, if that is limited.
-    fn parallel_max(&self) -> Option<usize>;
-
-    /// What the worlds have gone through so far, by names below `sys/` that [`super::METRICS`] explains.
-    fn counts(&self) -> Vec<(&'static str, u64)>;
-}
-
-/// The built-in simulator, which never fails and has no limits.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Simulator;
-
-impl WorldSource for Simulator {
-    fn make(&self, config: &EnvironmentConfig) -> Result<Box<dyn Environment>, Error> {
-        config.make()
-    }
-
-    fn parallel_max(&self) -> Option<usize> {
-        None
-    }
-
-    fn counts(&self) -> Vec<(&'static str, u64)> {
-        Vec::new()
-    }
-}
-
-/// Builds worlds of the kind that a configuration names.
+/// The world of a run, from which its environments are made.
 #[derive(Debug, Clone)]
 pub struct World {
-    source: Arc<dyn WorldSource>,
-    config: EnvironmentConfig,
-    spec: EnvironmentSpec,
-    prior: Arc<dyn PriorKnowledge>,
+    world: Arc<dyn mackrl_env::World>,
 }
 
 impl World {
@@ -59,48 +23,40 @@ impl World {
     /// # Errors
     /// [`Error::Config`] if there is no such map or the world refuses a setting.
     pub fn new(config: &Config) -> Result<Self, Error> {
-        Self::from_source(config, Arc::new(Simulator))
+        Self::of(config.env.world()?)
     }
 
-    /// Reads the configuration's `env` section, for worlds that `source` makes.
+    /// A run in `world`, whatever its kind.
     ///
     /// # Errors
-    /// [`Error::Config`] as [`WorldSource::make`].
-    pub fn from_source(config: &Config, source: Arc<dyn WorldSource>) -> Result<Self, Error> {
-        let environment = source.make(&config.env)?;
-        let (spec, prior) = (environment.spec().clone(), environment.prior_knowledge());
-        Ok(Self {
-            source,
-            config: config.env.clone(),
-            spec,
-            prior,
-        })
+    /// [`Error::Config`] if its sizes are none that a world can have.
+    pub fn of(world: Arc<dyn mackrl_env::World>) -> Result<Self, Error> {
+        world.spec().validate().map_err(WorldError::from)?;
+        Ok(Self { world })
     }
 
-    /// Where the worlds come from.
+    /// What the environments are copies of.
     #[must_use]
-    pub fn source(&self) -> &dyn WorldSource {
-        &*self.source
+    pub fn source(&self) -> &dyn mackrl_env::World {
+        &*self.world
     }
 
     /// Sizes and limits.
     #[must_use]
-    pub const fn spec(&self) -> &EnvironmentSpec {
-        &self.spec
+    pub fn spec(&self) -> &EnvironmentSpec {
+        self.world.spec()
     }
 
     /// What every agent knows before the game.
     #[must_use]
     pub fn prior(&self) -> Arc<dyn PriorKnowledge> {
-        Arc::clone(&self.prior)
+        self.world.prior_knowledge()
     }
 
-    /// `count` worlds.
-    ///
-    /// # Errors
-    /// [`Error::Config`] as [`World::new`].
-    pub fn environments(&self, count: usize) -> Result<Vec<Box<dyn Environment>>, Error> {
-        (0..count).map(|_| self.source.make(&self.config)).collect()
+    /// `count` environments.
+    #[must_use]
+    pub fn environments(&self, count: usize) -> Vec<Box<dyn Environment>> {
+        (0..count).map(|_| self.world.make()).collect()
     }
 }
 

@@ -1,15 +1,18 @@
 //! Greedy episodes with fixed weights.
 
-use std::sync::{Arc, atomic::AtomicBool};
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, atomic::AtomicBool},
+};
 
 use mackrl::{
     Error,
-    experience::{Collector, PlaySettings},
+    experience::{Collector, Episode, PlaySettings},
     policy::{Behaviour, Parameters, Policy, Recording, Tally},
     statistics::mean_and_standard_error,
 };
-use mackrl_env::{EpisodeKey, Stream};
-use serde::{Deserialize, Serialize};
+use mackrl_env::{EnvironmentSpec, EpisodeKey, Stream};
+use serde::{Serialize, Serializer, ser::SerializeMap};
 
 use super::assembly;
 use crate::config::Config;
@@ -20,33 +23,56 @@ const PARALLEL_EPISODES: usize = 32;
 const SHARD_SIZE: usize = 8;
 
 /// How a team plays: means over episodes, each with its standard error.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+///
+/// As JSON it is an object of numbers: for every quantity `test_NAME_mean` and `test_NAME_sem`.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Evaluation {
     /// Episodes played.
     pub episodes: usize,
-    /// Share of episodes that were won.
-    pub test_battle_won_mean: f64,
-    /// Its standard error.
-    pub test_battle_won_sem: f64,
-    /// Undiscounted return.
-    pub test_return_mean: f64,
-    /// Its standard error.
-    pub test_return_sem: f64,
-    /// Length in environment steps.
-    pub test_ep_length_mean: f64,
-    /// Its standard error.
-    pub test_ep_length_sem: f64,
-    /// Agents lost.
-    pub test_dead_allies_mean: f64,
-    /// Its standard error.
-    pub test_dead_allies_sem: f64,
-    /// Enemies defeated.
-    pub test_dead_enemies_mean: f64,
-    /// Its standard error.
-    pub test_dead_enemies_sem: f64,
+    /// The world's success, if it declares one, then `return`, undiscounted, and `ep_length`, in environment steps, then the
+    /// other statistics that it declares.
+    pub quantities: Vec<Quantity>,
     /// What the controllers did, under the names that `METRICS` explains.
-    #[serde(flatten)]
-    pub controllers: std::collections::BTreeMap<String, f64>,
+    pub controllers: BTreeMap<String, f64>,
+}
+
+/// Something measured in every episode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Quantity {
+    /// Name, such as `return`.
+    pub name: String,
+    /// Mean over the episodes.
+    pub mean: f64,
+    /// Its standard error.
+    pub standard_error: f64,
+}
+
+impl Evaluation {
+    /// The mean over the episodes of the quantity called `name`, such as `return` or a statistic of the world.
+    #[must_use]
+    pub fn mean(&self, name: &str) -> Option<f64> {
+        let quantity = self
+            .quantities
+            .iter()
+            .find(|quantity| quantity.name == name);
+        quantity.map(|quantity| quantity.mean)
+    }
+}
+
+impl Serialize for Evaluation {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("episodes", &self.episodes)?;
+        for quantity in &self.quantities {
+            let name = &quantity.name;
+            map.serialize_entry(&format!("test_{name}_mean"), &quantity.mean)?;
+            map.serialize_entry(&format!("test_{name}_sem"), &quantity.standard_error)?;
+        }
+        for (name, mean) in &self.controllers {
+            map.serialize_entry(name, mean)?;
+        }
+        map.end()
+    }
 }
 
 /// Plays `episodes` greedy episodes with the weights of a safetensors file. `threads` changes no result.
@@ -93,7 +119,7 @@ pub fn evaluate_in(
     threads: usize,
 ) -> Result<Evaluation, Error> {
     let algorithm = assembly::trained(config, world, weights)?;
-    let mut evaluator = Evaluator::new(algorithm.policy(), world, episodes.count, threads)?;
+    let mut evaluator = Evaluator::new(algorithm.policy(), world, episodes.count, threads);
     evaluator.play(algorithm.parameters(), episodes.count, |episode| {
         EpisodeKey::new(episodes.seed, Stream::Evaluation, episode)
     })
@@ -103,6 +129,7 @@ pub fn evaluate_in(
 #[derive(Debug)]
 pub(super) struct Evaluator {
     collector: Collector,
+    samples: Samples,
 }
 
 impl Evaluator {
@@ -112,13 +139,14 @@ impl Evaluator {
         world: &assembly::World,
         episodes: usize,
         threads: usize,
-    ) -> Result<Self, Error> {
+    ) -> Self {
         let parallel_max = world.source().parallel_max().unwrap_or(PARALLEL_EPISODES);
-        let environments = world.environments(episodes.clamp(1, parallel_max.max(1)))?;
+        let environments = world.environments(episodes.clamp(1, parallel_max.max(1)));
         let shards = environments.len().div_ceil(SHARD_SIZE);
-        Ok(Self {
+        Self {
             collector: Collector::new(policy, environments, shards, threads),
-        })
+            samples: Samples::of(world.spec()),
+        }
     }
 
     /// Gives up playing as soon as `stop` is set.
@@ -142,7 +170,7 @@ impl Evaluator {
             behaviour: Behaviour::GREEDY,
             recording: Recording::Off,
         };
-        let mut samples: [Vec<f64>; 5] = Default::default();
+        self.samples.clear();
         let mut tally = Tally::default();
         let keys: Vec<EpisodeKey> = (0..episodes as u64).map(key).collect();
         for keys in keys.chunks(self.collector.environments()) {
@@ -150,38 +178,81 @@ impl Evaluator {
             tally.merge(&self.collector.tally());
             let pieces = self.collector.pieces();
             for episode in pieces.flat_map(|piece| &piece.experience.episodes) {
-                let statistics = episode.statistics;
-                let numbers = [
-                    f64::from(u8::from(statistics.battle_won)),
-                    episode.total_reward(),
-                    episode.steps() as f64,
-                    statistics.dead_allies as f64,
-                    statistics.dead_enemies as f64,
-                ];
-                samples
-                    .iter_mut()
-                    .zip(numbers)
-                    .for_each(|(sample, number)| sample.push(number));
+                self.samples.add(episode);
             }
         }
-        let [won, return_, length, dead_allies, dead_enemies] =
-            samples.map(|sample| mean_and_standard_error(&sample));
         Ok(Evaluation {
             episodes,
-            test_battle_won_mean: won.0,
-            test_battle_won_sem: won.1,
-            test_return_mean: return_.0,
-            test_return_sem: return_.1,
-            test_ep_length_mean: length.0,
-            test_ep_length_sem: length.1,
-            test_dead_allies_mean: dead_allies.0,
-            test_dead_allies_sem: dead_allies.1,
-            test_dead_enemies_mean: dead_enemies.0,
-            test_dead_enemies_sem: dead_enemies.1,
+            quantities: self.samples.quantities(),
             controllers: tally
                 .means()
                 .map(|(name, mean)| (name.to_owned(), mean))
                 .collect(),
         })
+    }
+}
+
+/// What is measured of an episode.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Measure {
+    Return,
+    Length,
+    /// The statistic at this index of those that the world declares.
+    Statistic(usize),
+}
+
+/// What was measured in every episode, by names and in the order of [`Evaluation::quantities`].
+#[derive(Debug)]
+struct Samples {
+    measured: Vec<(String, Measure, Vec<f64>)>,
+}
+
+impl Samples {
+    fn of(spec: &EnvironmentSpec) -> Self {
+        let own = |index: usize| {
+            let name = &spec.statistics[index].name;
+            (name.to_string(), Measure::Statistic(index), Vec::new())
+        };
+        let others = (0..spec.statistics.len()).filter(|index| spec.success != Some(*index));
+        let always = [
+            ("return".to_owned(), Measure::Return, Vec::new()),
+            ("ep_length".to_owned(), Measure::Length, Vec::new()),
+        ];
+        let success = spec.success.map(own);
+        Self {
+            measured: success
+                .into_iter()
+                .chain(always)
+                .chain(others.map(own))
+                .collect(),
+        }
+    }
+
+    fn clear(&mut self) {
+        self.measured
+            .iter_mut()
+            .for_each(|(_, _, sample)| sample.clear());
+    }
+
+    fn add(&mut self, episode: &Episode) {
+        for (_, measure, sample) in &mut self.measured {
+            sample.push(match *measure {
+                Measure::Return => episode.total_reward(),
+                Measure::Length => episode.steps() as f64,
+                Measure::Statistic(index) => episode.statistics_s[index],
+            });
+        }
+    }
+
+    fn quantities(&self) -> Vec<Quantity> {
+        let quantity = |(name, _, sample): &(String, Measure, Vec<f64>)| {
+            let (mean, standard_error) = mean_and_standard_error(sample);
+            Quantity {
+                name: name.clone(),
+                mean,
+                standard_error,
+            }
+        };
+        self.measured.iter().map(quantity).collect()
     }
 }

@@ -3,9 +3,11 @@
 //! Names without a prefix are PyMARL's, so that people's scripts find them. `mackrl/` is our own, `sys/` depends on the machine
 //! and the clock and is left out when runs are compared.
 
+use mackrl_env::{EnvironmentSpec, Statistic};
 use serde::{Serialize, Serializer, ser::SerializeMap};
 
-/// A metric's name (or the part before a number) and what it means, of everything that does not depend on the algorithm.
+/// A metric's name (or the part before a number) and what it means, of everything that depends neither on the algorithm,
+/// which explains its own, nor on the world: [`of_statistics`] and [`mackrl_env::Counter`] say what those mean.
 ///
 /// Means are over the interval since the last row, weighted by how often the thing occurred.
 pub const METRICS: &[(&str, &str)] = &[
@@ -28,22 +30,6 @@ pub const METRICS: &[(&str, &str)] = &[
         "mean length of training episodes, in environment steps",
     ),
     (
-        "battle_won_mean",
-        "share of training episodes that were won",
-    ),
-    (
-        "dead_allies_mean",
-        "mean number of agents lost in an episode",
-    ),
-    (
-        "dead_enemies_mean",
-        "mean number of enemies defeated in an episode",
-    ),
-    (
-        "test_battle_won_mean",
-        "share of greedy test episodes that were won",
-    ),
-    (
         "test_return_mean",
         "mean undiscounted return of greedy test episodes",
     ),
@@ -52,38 +38,8 @@ pub const METRICS: &[(&str, &str)] = &[
         "mean length of greedy test episodes, in environment steps",
     ),
     (
-        "test_dead_allies_mean",
-        "mean number of agents lost in a greedy test episode",
-    ),
-    (
-        "test_dead_enemies_mean",
-        "mean number of enemies defeated in a greedy test episode",
-    ),
-    (
         "sys/episodes_discarded",
         "episodes so far that were played in vain because a game failed under them or beside them; nothing of them is learnt or counted",
-    ),
-    ("sys/game_launches", "processes of the game started so far"),
-    (
-        "sys/game_faults_launch",
-        "games so far that did not start or did not listen",
-    ),
-    (
-        "sys/game_faults_version",
-        "games so far that were not the version that was asked for",
-    ),
-    (
-        "sys/game_faults_late",
-        "games so far that did not answer in time",
-    ),
-    ("sys/game_faults_closed", "games so far that went away"),
-    (
-        "sys/game_faults_garbage",
-        "games so far whose answer made no sense",
-    ),
-    (
-        "sys/game_faults_refused",
-        "games so far that refused what was asked",
     ),
     (
         "sys/sps",
@@ -91,18 +47,58 @@ pub const METRICS: &[(&str, &str)] = &[
     ),
 ];
 
+/// Names and meanings of the metrics that come from the statistics of a world, in training episodes and in greedy tests.
+#[must_use]
+pub fn of_statistics(spec: &EnvironmentSpec) -> Vec<(String, String)> {
+    let of = |statistic: &Statistic, prefix: &str, episodes: &str| {
+        let name = format!("{prefix}{}_mean", statistic.name);
+        (
+            name,
+            format!("mean over {episodes} of: {}", statistic.meaning),
+        )
+    };
+    let metrics = spec.statistics.iter().flat_map(|statistic| {
+        [
+            of(statistic, "", "training episodes"),
+            of(statistic, "test_", "greedy test episodes"),
+        ]
+    });
+    metrics.collect()
+}
+
+/// The metric that says best how well a team plays in a world: its success in greedy tests, or, if it declares none, the
+/// return.
+#[must_use]
+pub fn headline(spec: &EnvironmentSpec) -> String {
+    let name = spec.success().map_or("return", |success| &success.name);
+    format!("test_{name}_mean")
+}
+
+/// A number of a row.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Number {
+    /// How many there are of something, written without a fraction.
+    Count(u64),
+    /// Anything else.
+    Real(f64),
+}
+
 /// One row of metrics: names and numbers in the order in which they are written.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct MetricRow {
-    entries: Vec<(String, f64)>,
+    entries: Vec<(String, Number)>,
     experience_hash: Option<u64>,
 }
 
 impl MetricRow {
-    /// Appends a number under a name that [`METRICS`] or the algorithm explains.
+    /// Appends a number.
     pub fn push(&mut self, name: impl Into<String>, value: f64) {
-        let name = name.into();
-        self.entries.push((name, value));
+        self.entries.push((name.into(), Number::Real(value)));
+    }
+
+    /// Appends how many there are of something.
+    pub fn push_count(&mut self, name: impl Into<String>, count: u64) {
+        self.entries.push((name.into(), Number::Count(count)));
     }
 
     /// Notes the hash of the training episodes so far.
@@ -116,26 +112,34 @@ impl MetricRow {
         self.entries
             .iter()
             .find(|(own, _)| own == name)
-            .map(|(_, value)| *value)
+            .map(|(_, number)| number.value())
     }
 
     /// All entries, in order.
     pub fn iter(&self) -> impl Iterator<Item = (&str, f64)> {
         self.entries
             .iter()
-            .map(|(name, value)| (name.as_str(), *value))
+            .map(|(name, number)| (name.as_str(), number.value()))
     }
 }
 
-/// A row is a JSON object; whole numbers are written without a fraction, the hash as a string of digits.
+impl Number {
+    const fn value(self) -> f64 {
+        match self {
+            Self::Count(count) => count as f64,
+            Self::Real(value) => value,
+        }
+    }
+}
+
+/// A row is a JSON object; counts are written without a fraction, the hash as a string of digits.
 impl Serialize for MetricRow {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(None)?;
-        for (name, value) in &self.entries {
-            if is_count(name) {
-                map.serialize_entry(name, &as_count(*value))?;
-            } else {
-                map.serialize_entry(name, value)?;
+        for (name, number) in &self.entries {
+            match number {
+                Number::Count(count) => map.serialize_entry(name, count)?,
+                Number::Real(value) => map.serialize_entry(name, value)?,
             }
         }
         if let Some(hash) = self.experience_hash {
@@ -145,28 +149,13 @@ impl Serialize for MetricRow {
     }
 }
 
-/// Whether a number counts things.
-fn is_count(name: &str) -> bool {
-    matches!(
-        name,
-        "t_env" | "episode" | "update" | "sys/episodes_discarded"
-    ) || name.starts_with("sys/game_")
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "counts are whole, not negative and far below 2^53"
-)]
-const fn as_count(value: f64) -> u64 {
-    value as u64
-}
-
-/// Whether [`METRICS`] or the metrics of an algorithm, which may begin with `test_` for greedy episodes, explain a name.
+/// Whether a metric is one that every run has, one of the algorithm's own (which may begin with `test_` for greedy episodes), or
+/// the mean of a statistic of the world over training episodes.
 #[must_use]
-pub fn is_explained(name: &str, of_algorithm: &[(&str, &str)]) -> bool {
+pub fn is_explained(name: &str, of_algorithm: &[(&str, &str)], statistics: &[Statistic]) -> bool {
     let own = name.strip_prefix("test_").unwrap_or(name);
-    explains(METRICS, name) || explains(of_algorithm, own)
+    let of_world = |statistic: &Statistic| name.strip_suffix("_mean") == Some(&*statistic.name);
+    explains(METRICS, name) || explains(of_algorithm, own) || statistics.iter().any(of_world)
 }
 
 fn explains(metrics: &[(&str, &str)], name: &str) -> bool {
@@ -184,7 +173,7 @@ mod tests {
     #[test]
     fn a_row_is_a_json_object_in_its_own_order() {
         let mut row = MetricRow::default();
-        row.push("t_env", 240.0);
+        row.push_count("t_env", 240);
         row.push("battle_won_mean", 0.125);
         assert_eq!(
             serde_json::to_string(&row).unwrap(),
@@ -202,10 +191,35 @@ mod tests {
             "loss",
             "t_env",
         ] {
-            assert!(is_explained(name, &own), "{name}");
+            assert!(is_explained(name, &own, &[]), "{name}");
         }
         for name in ["rate_by_enemies_x", "t_envy", "losses"] {
-            assert!(!is_explained(name, &own), "{name}");
+            assert!(!is_explained(name, &own, &[]), "{name}");
         }
+    }
+
+    #[test]
+    fn statistics_of_a_world_are_metrics_under_its_own_names() {
+        let skirmish = mackrl_skirmish::make("3m", &mackrl_skirmish::SkirmishSettings::default());
+        let spec = mackrl_env::Environment::spec(&skirmish.unwrap()).clone();
+        let names: Vec<String> = of_statistics(&spec)
+            .into_iter()
+            .map(|(name, _)| name)
+            .collect();
+        let expected = [
+            "battle_won_mean",
+            "test_battle_won_mean",
+            "dead_allies_mean",
+            "test_dead_allies_mean",
+            "dead_enemies_mean",
+            "test_dead_enemies_mean",
+        ];
+        assert_eq!(names, expected);
+        assert_eq!(headline(&spec), "test_battle_won_mean");
+        let unsuccessful = EnvironmentSpec {
+            success: None,
+            ..spec
+        };
+        assert_eq!(headline(&unsuccessful), "test_return_mean");
     }
 }

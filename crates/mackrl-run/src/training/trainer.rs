@@ -12,7 +12,7 @@ use mackrl::{
     nn::ParameterLayout,
     policy::{Recording, Tally},
 };
-use mackrl_env::{EpisodeKey, Stream};
+use mackrl_env::{EpisodeKey, Statistic, Stream};
 
 use super::{
     Checkpoint, Evaluation, MetricRow, StoredWeights, assembly, checkpoint::Counters,
@@ -77,10 +77,10 @@ impl Trainer {
         threads: usize,
     ) -> Result<Self, Error> {
         let (policy, shards) = (algorithm.policy(), algorithm.shards());
-        let environments = world.environments(algorithm.environments())?;
+        let environments = world.environments(algorithm.environments());
         Ok(Self {
             collector: Collector::new(policy, environments, shards, threads),
-            evaluator: Evaluator::new(policy, world, config.test.episodes, threads)?,
+            evaluator: Evaluator::new(policy, world, config.test.episodes, threads),
             world: world.clone(),
             algorithm,
             config: config.clone(),
@@ -221,7 +221,8 @@ impl Trainer {
     /// [`Error::Data`] if the checkpoint is damaged or belongs to another configuration. Nothing has changed then.
     pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), Error> {
         let metrics = self.algorithm.metrics();
-        let opened = checkpoint.open(|name| is_explained(name, metrics))?;
+        let statistics = &self.world.spec().statistics;
+        let opened = checkpoint.open(|name| is_explained(name, metrics, statistics))?;
         self.algorithm.restore(&opened)?;
         let counters = opened.trainer;
         self.steps_env = counters.steps_env;
@@ -284,7 +285,8 @@ impl Trainer {
         for episode in pieces.flat_map(|piece| &piece.experience.episodes) {
             self.steps_env += episode.steps() as u64;
             self.experience.add(episode);
-            self.interval.note_episode(episode);
+            self.interval
+                .note_episode(episode, &self.world.spec().statistics);
         }
         self.interval.tally.merge(&report);
         self.interval.tally.merge(&self.collector.tally());
@@ -334,9 +336,9 @@ impl Trainer {
             played => (played / every + 1) * every,
         };
         let mut row = MetricRow::default();
-        row.push("t_env", self.steps_env as f64);
-        row.push("episode", self.episodes as f64);
-        row.push("update", self.algorithm.updates() as f64);
+        row.push_count("t_env", self.steps_env);
+        row.push_count("episode", self.episodes);
+        row.push_count("update", self.algorithm.updates());
         row.set_experience_hash(self.experience.0);
         interval
             .tally
@@ -351,10 +353,10 @@ impl Trainer {
         }
         let discarded = self.collector.discarded() + self.evaluator.discarded();
         if discarded > 0 {
-            row.push("sys/episodes_discarded", discarded as f64);
+            row.push_count("sys/episodes_discarded", discarded);
         }
-        for (name, count) in self.world.source().counts() {
-            row.push(name, count as f64);
+        for counter in self.world.source().counters() {
+            row.push_count(format!("sys/{}", counter.name), counter.value);
         }
         row
     }
@@ -378,27 +380,20 @@ impl Interval {
         }
     }
 
-    fn note_episode(&mut self, episode: &Episode) {
-        let statistics = episode.statistics;
+    fn note_episode(&mut self, episode: &Episode, statistics: &[Statistic]) {
         let tally = &mut self.tally;
         tally.add("return_mean", episode.total_reward(), 1.0);
         tally.add("ep_length_mean", episode.steps() as f64, 1.0);
-        tally.add(
-            "battle_won_mean",
-            f64::from(u8::from(statistics.battle_won)),
-            1.0,
-        );
-        tally.add("dead_allies_mean", statistics.dead_allies as f64, 1.0);
-        tally.add("dead_enemies_mean", statistics.dead_enemies as f64, 1.0);
+        for (statistic, value) in statistics.iter().zip(&episode.statistics_s) {
+            tally.add(format!("{}_mean", statistic.name), *value, 1.0);
+        }
     }
 }
 
 fn append_test(row: &mut MetricRow, evaluation: &Evaluation) {
-    row.push("test_battle_won_mean", evaluation.test_battle_won_mean);
-    row.push("test_return_mean", evaluation.test_return_mean);
-    row.push("test_ep_length_mean", evaluation.test_ep_length_mean);
-    row.push("test_dead_allies_mean", evaluation.test_dead_allies_mean);
-    row.push("test_dead_enemies_mean", evaluation.test_dead_enemies_mean);
+    for quantity in &evaluation.quantities {
+        row.push(format!("test_{}_mean", quantity.name), quantity.mean);
+    }
     let delegation = evaluation.controllers.iter();
     for (name, value) in delegation.filter(|(name, _)| name.contains("delegation")) {
         row.push(format!("test_{name}"), *value);

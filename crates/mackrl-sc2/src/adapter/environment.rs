@@ -3,11 +3,12 @@
 use std::{fmt, sync::Arc, thread, time::Duration};
 
 use mackrl_env::{
-    Action, Draw, EntitySet, Environment, EnvironmentSpec, EpisodeKey, EpisodeStatistics,
-    Interruption, ObservationMut, PriorKnowledge, StepError, TimeStep,
+    Action, Draw, EntitySet, Environment, EnvironmentSpec, EpisodeKey, Interruption,
+    ObservationMut, PriorKnowledge, StepError, TimeStep,
 };
 use mackrl_skirmish::{
-    Encounter, Face, Scenario, SkirmishError, SkirmishSettings, rules::BattleState,
+    BattleStatistics, Encounter, Face, Scenario, SkirmishError, SkirmishSettings,
+    rules::BattleState,
 };
 
 use super::{fault::GameFault, game::Game, pool::GamePool, roster::Roster};
@@ -62,6 +63,12 @@ impl StarCraft2 {
             replays: None,
             watcher: None,
         })
+    }
+
+    /// How the current episode stands.
+    #[must_use]
+    pub const fn battle_statistics(&self) -> BattleStatistics {
+        self.face.statistics()
     }
 
     /// Where everybody is, as the game reported last.
@@ -242,8 +249,8 @@ impl Environment for StarCraft2 {
         Ok(step)
     }
 
-    fn statistics(&self) -> EpisodeStatistics {
-        self.face.statistics()
+    fn statistics(&self, statistics_s: &mut [f64]) {
+        statistics_s.copy_from_slice(&self.face.statistics().values());
     }
 }
 

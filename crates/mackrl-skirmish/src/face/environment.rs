@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use mackrl_env::{
-    Action, Environment, EnvironmentSpec, EpisodeKey, EpisodeStatistics, ObservationMut,
-    PriorKnowledge, StepError, Stream, TimeStep,
+    Action, Environment, EnvironmentSpec, EpisodeKey, ObservationMut, PriorKnowledge, StepError,
+    Stream, TimeStep,
 };
 
 use crate::{
@@ -13,6 +13,7 @@ use crate::{
     error::SkirmishError,
     face::{
         layout::Layout,
+        statistics::BattleStatistics,
         view::{BattleTally, Face},
     },
     rules::{Battle, Chance, Order, UnitIndex},
@@ -66,6 +67,12 @@ impl Skirmish {
     #[must_use]
     pub fn scenario(&self) -> &Scenario {
         self.encounter.scenario()
+    }
+
+    /// How the current episode stands.
+    #[must_use]
+    pub const fn battle_statistics(&self) -> BattleStatistics {
+        self.face.statistics()
     }
 
     /// Episodes ended and won since the environment was made.
@@ -150,7 +157,7 @@ impl Environment for Skirmish {
         Ok(self.play(actions, out))
     }
 
-    fn statistics(&self) -> EpisodeStatistics {
-        self.face.statistics()
+    fn statistics(&self, statistics_s: &mut [f64]) {
+        statistics_s.copy_from_slice(&self.face.statistics().values());
     }
 }

@@ -4,6 +4,7 @@ use mackrl_env::EnvironmentSpec;
 
 use crate::{
     actions::{DIRECTIONS, TARGETS_FROM},
+    face::statistics::BattleStatistics,
     rules::Team,
     scenario::{Race, Scenario},
     settings::{Compatibility, SkirmishSettings},
@@ -203,6 +204,8 @@ impl Layout {
             state_size: self.state_size(),
             episode_limit: scenario.episode_limit,
             distance_scale: settings.sight_range,
+            statistics: BattleStatistics::declared().to_vec(),
+            success: Some(0),
         }
     }
 }

@@ -6,11 +6,13 @@ mod layout;
 mod observation;
 mod reward;
 mod state_vector;
+mod statistics;
 mod view;
 
 pub use environment::Skirmish;
 pub use knowledge::SkirmishKnowledge;
 pub use layout::Layout;
+pub use statistics::BattleStatistics;
 pub use view::{BattleTally, Face};
 
 #[cfg(test)]

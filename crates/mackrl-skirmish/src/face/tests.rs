@@ -226,7 +226,7 @@ fn the_dead_see_nothing_and_can_do_nothing() {
             ("stalker", [12.0, 14.0]),
         ],
     );
-    while play.skirmish.statistics().dead_allies == 0 {
+    while play.skirmish.battle_statistics().dead_allies == 0 {
         play.step(&[1, 1]);
     }
     assert_eq!(play.available(0), [0]);
@@ -265,7 +265,10 @@ fn an_undecided_game_is_truncated_at_its_limit() {
     }
     let last = play.step(&[1]);
     assert_eq!((last.end, last.reward), (Some(EpisodeEnd::Truncated), 0.0));
-    assert!(!play.skirmish.statistics().battle_won, "nobody has won");
+    assert!(
+        !play.skirmish.battle_statistics().battle_won,
+        "nobody has won"
+    );
 }
 
 #[test]
@@ -420,7 +423,10 @@ fn a_battle_in_which_only_medivacs_are_left_is_over() {
             .skirmish
             .step(&actions, &mut play.observations.row_mut(0))
             .unwrap();
-        (step.end.is_some(), play.skirmish.statistics().battle_won)
+        (
+            step.end.is_some(),
+            play.skirmish.battle_statistics().battle_won,
+        )
     };
     assert_eq!(play(&[0], &[0]), (false, false), "fighters on both sides");
     assert_eq!(play(&[0, 1], &[]), (true, false), "the team's are gone");

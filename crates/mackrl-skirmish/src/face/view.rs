@@ -7,8 +7,7 @@
 use std::sync::Arc;
 
 use mackrl_env::{
-    Action, AgentId, EnvironmentSpec, EpisodeEnd, EpisodeStatistics, IllegalAction, ObservationMut,
-    TimeStep,
+    Action, AgentId, EnvironmentSpec, EpisodeEnd, IllegalAction, ObservationMut, TimeStep,
 };
 
 use crate::{
@@ -20,6 +19,7 @@ use crate::{
         observation::Scene,
         reward::{Outcome, Rewards},
         state_vector::cooldown_scale,
+        statistics::BattleStatistics,
     },
     rules::{BattleState, Order, Team, UnitIndex},
     scenario::Scenario,
@@ -38,7 +38,7 @@ pub struct Face {
     rewards: Rewards,
     last_actions: Vec<Option<Action>>,
     steps: usize,
-    statistics: EpisodeStatistics,
+    statistics: BattleStatistics,
     tally: BattleTally,
 }
 
@@ -84,7 +84,7 @@ impl Face {
             rewards: Rewards::new(start, scenario.agents, &settings),
             last_actions: vec![None; scenario.agents],
             steps: 0,
-            statistics: EpisodeStatistics::default(),
+            statistics: BattleStatistics::default(),
             tally: BattleTally::default(),
             layout,
             settings,
@@ -124,7 +124,7 @@ impl Face {
 
     /// How the current episode stands.
     #[must_use]
-    pub const fn statistics(&self) -> EpisodeStatistics {
+    pub const fn statistics(&self) -> BattleStatistics {
         self.statistics
     }
 
@@ -145,7 +145,7 @@ impl Face {
         self.steps = 0;
         self.rewards.remember(state);
         self.last_actions.fill(None);
-        self.statistics = EpisodeStatistics::default();
+        self.statistics = BattleStatistics::default();
         self.write(state, out);
     }
 
@@ -220,7 +220,7 @@ impl Face {
         self.steps += 1;
         let outcome = self.outcome(state);
         let reward = self.rewards.settle(state, outcome, &self.settings);
-        self.statistics = EpisodeStatistics {
+        self.statistics = BattleStatistics {
             battle_won: outcome == Outcome::Won,
             dead_allies: self.layout.agents - state.living(Team::Ally),
             dead_enemies: self.layout.enemies - state.living(Team::Enemy),

@@ -169,7 +169,7 @@ impl Player {
                 break end;
             }
         };
-        let statistics = self.skirmish.statistics();
+        let statistics = self.skirmish.battle_statistics();
         Played {
             length,
             total,

@@ -20,8 +20,8 @@ fn play(map: &str, policy: ScriptedPolicy, episodes: u64) -> (u64, usize) {
                 break;
             }
         }
-        won += u64::from(skirmish.statistics().battle_won);
-        dead_enemies += skirmish.statistics().dead_enemies;
+        won += u64::from(skirmish.battle_statistics().battle_won);
+        dead_enemies += skirmish.battle_statistics().dead_enemies;
     }
     (won, dead_enemies)
 }

@@ -1,6 +1,6 @@
 //! One episode of one environment.
 
-use mackrl_env::{Action, EntitySet, EpisodeEnd, EpisodeStatistics, Observations};
+use mackrl_env::{Action, EntitySet, EpisodeEnd, Observations};
 
 use crate::policy::Recording;
 
@@ -20,8 +20,8 @@ pub struct Episode {
     pub reward_t: Vec<f32>,
     /// Why the episode ended; `None` while it runs.
     pub end: Option<EpisodeEnd>,
-    /// How it ended.
-    pub statistics: EpisodeStatistics,
+    /// How it ended \[S\], in the order in which the world declares its statistics; empty while it runs.
+    pub statistics_s: Vec<f64>,
 }
 
 impl Episode {
@@ -65,7 +65,7 @@ impl Episode {
         self.log_p_t.clear();
         self.reward_t.clear();
         self.end = None;
-        self.statistics = EpisodeStatistics::default();
+        self.statistics_s.clear();
     }
 
     /// Appends the state of environment `b`, if it will be needed.

@@ -179,7 +179,10 @@ impl Shard {
         episode.end = time_step.end;
         episode.remember_state(settings.recording, &self.observations, b);
         if time_step.end.is_some() {
-            episode.statistics = self.environments[b].statistics();
+            let environment = &self.environments[b];
+            let count = environment.spec().statistics.len();
+            episode.statistics_s.resize(count, 0.0);
+            environment.statistics(&mut episode.statistics_s);
         }
         Ok(())
     }

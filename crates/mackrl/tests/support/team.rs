@@ -37,7 +37,7 @@ impl Team {
 
     /// `count` environments, `shard_size` of them to an actor.
     pub(crate) fn rollout(&self, count: usize, shard_size: usize) -> Rollout {
-        let environments = self.world.environments(count).expect("as the first world");
+        let environments = self.world.environments(count);
         Rollout::new(&*self.policy, environments, shard_size, 1)
     }
 

@@ -43,7 +43,7 @@ pub(super) fn run(args: &BenchEnvironmentArgs) -> anyhow::Result<()> {
     )?;
     let players = (0..args.threads.get() as u64).map(|seed| {
         Ok(Player {
-            play: RandomPlay::new(world.make()?, seed),
+            play: RandomPlay::new(world.world()?.make(), seed),
             outcome: Ok(()),
         })
     });

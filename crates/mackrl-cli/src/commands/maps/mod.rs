@@ -50,7 +50,7 @@ fn all() -> anyhow::Result<Vec<Row>> {
 fn show(name: &str, json: bool) -> anyhow::Result<()> {
     let world = world(ConfigBuilder::new(), &format!("maps {name}"), name, &[])?;
     if world.is_matrix_game() {
-        let game = card::MatrixGameCard::new(world.make()?.spec());
+        let game = card::MatrixGameCard::new(world.world()?.spec());
         return if json {
             output::print_json(&game)
         } else {

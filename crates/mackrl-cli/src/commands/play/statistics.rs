@@ -5,9 +5,12 @@ use std::sync::{
     atomic::{AtomicUsize, Ordering},
 };
 
-use mackrl_env::{Action, Environment, EpisodeKey, Observations, StepError, Stream};
-use mackrl_run::{config::EnvironmentConfig, training::assembly::WorldSource};
-use mackrl_skirmish::scripted::{ScriptedPolicy, ScriptedTeam};
+use mackrl_env::{Action, Environment, EpisodeKey, Observations, StepError, Stream, World};
+use mackrl_run::config::EnvironmentConfig;
+use mackrl_skirmish::{
+    BattleStatistics,
+    scripted::{ScriptedPolicy, ScriptedTeam},
+};
 use serde::Serialize;
 
 use crate::{commands::sc2, output};
@@ -48,10 +51,10 @@ pub(super) fn play_many(
     let portions = episodes.div_ceil(PORTION);
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let finished = Mutex::new(Vec::new());
-    let worlds = sc2::worlds(map);
+    let world = sc2::world_of(map)?;
     std::thread::scope(|scope| {
         let work = || -> anyhow::Result<()> {
-            let mut player = Player::new(map, policy, &*worlds)?;
+            let mut player = Player::new(map, policy, &*world)?;
             loop {
                 let portion = next.fetch_add(1, Ordering::Relaxed);
                 if portion >= portions {
@@ -95,9 +98,9 @@ impl Player {
     fn new(
         map: &EnvironmentConfig,
         policy: ScriptedPolicy,
-        worlds: &dyn WorldSource,
+        world: &dyn World,
     ) -> anyhow::Result<Self> {
-        let environment = worlds.make(map)?;
+        let environment = world.make();
         // Scripts know a map by its skirmish, whoever plays it.
         let team = ScriptedTeam::new(policy, &map.simulated().skirmish()?);
         Ok(Self {
@@ -134,14 +137,10 @@ impl Player {
                 break;
             }
         }
-        let statistics = self.environment.statistics();
-        Ok([
-            f64::from(u8::from(statistics.battle_won)),
-            total,
-            step as f64,
-            statistics.dead_allies as f64,
-            statistics.dead_enemies as f64,
-        ])
+        let mut statistics_s = [0.0; BattleStatistics::COUNT];
+        self.environment.statistics(&mut statistics_s);
+        let [battle_won, dead_allies, dead_enemies] = statistics_s;
+        Ok([battle_won, total, step as f64, dead_allies, dead_enemies])
     }
 }
 

@@ -12,7 +12,7 @@ use mackrl_sc2::lifetime::become_game;
 
 use crate::args::{ExecGameArgs, Sc2Args, Sc2Command};
 pub(crate) use play::play_one;
-pub(crate) use worlds::{world, worlds};
+pub(crate) use worlds::{world, world_of};
 
 /// Runs the command that was typed.
 pub(crate) fn run(args: &Sc2Args) -> anyhow::Result<()> {

@@ -1,12 +1,15 @@
 //! One scripted episode on StarCraft II, and the game's own replay of it.
 
 use anyhow::Context;
-use mackrl_env::{Action, Environment, EpisodeKey, EpisodeStatistics, Observations, StepError};
+use mackrl_env::{Action, Environment, EpisodeKey, Observations, StepError};
 use mackrl_run::config::EnvironmentConfig;
 use mackrl_sc2::adapter::StarCraft2;
-use mackrl_skirmish::scripted::{ScriptedPolicy, ScriptedTeam};
+use mackrl_skirmish::{
+    BattleStatistics,
+    scripted::{ScriptedPolicy, ScriptedTeam},
+};
 
-use super::worlds::StarCraftWorlds;
+use super::worlds::StarCraftWorld;
 use crate::{args::PlayArgs, output};
 
 /// Plays one episode, writes the game's replay, and says how it went.
@@ -16,8 +19,7 @@ pub(crate) fn play_one(
     policy: ScriptedPolicy,
     key: EpisodeKey,
 ) -> anyhow::Result<()> {
-    let worlds = StarCraftWorlds::default();
-    let mut environment = worlds.star_craft(map)?;
+    let mut environment = StarCraftWorld::new(map, 1)?.star_craft();
     environment.keep_replays();
     let steps = play(&mut environment, map, policy, key)?;
     if let Some(file) = &args.save_replay {
@@ -26,11 +28,11 @@ pub(crate) fn play_one(
             .context("the game gave no replay")?;
         std::fs::write(file, replay).with_context(|| format!("cannot write {}", file.display()))?;
     }
-    let EpisodeStatistics {
+    let BattleStatistics {
         battle_won,
         dead_allies,
         dead_enemies,
-    } = environment.statistics();
+    } = environment.battle_statistics();
     if args.json {
         return output::print_json(&serde_json::json!({
             "map": map.map,

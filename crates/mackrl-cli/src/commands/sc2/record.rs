@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 
 use super::{
     play,
-    worlds::{StarCraftWorlds, settings},
+    worlds::{StarCraftWorld, settings},
 };
 use crate::{args::RecordArgs, failure::Failure, output, reproduce::Meter};
 
@@ -32,7 +32,7 @@ pub(super) fn run(args: &RecordArgs) -> anyhow::Result<()> {
         game_version: args.game_version.clone().unwrap_or_default(),
         ..EnvironmentConfig::default()
     };
-    let mut environment = StarCraftWorlds::default().star_craft(&map)?;
+    let mut environment = StarCraftWorld::new(&map, 1)?.star_craft();
     let cannot = || format!("cannot write {}", args.out.display());
     let mut file = BufWriter::new(File::create(&args.out).with_context(cannot)?);
     let head = json!({

@@ -1,112 +1,148 @@
 //! Worlds of a run by its configuration: those of the simulator, or those of StarCraft II.
 
-use std::{
-    sync::{Arc, Mutex, PoisonError},
-    time::Duration,
-};
+use std::{sync::Arc, time::Duration};
 
 use mackrl::Error;
-use mackrl_env::Environment;
+use mackrl_env::{Counter, Environment, EnvironmentSpec, PriorKnowledge, World};
 use mackrl_run::{
     config::{Config, Engine, EnvironmentConfig},
-    training::assembly::{Simulator, World, WorldSource},
+    training::assembly,
 };
 use mackrl_sc2::adapter::{GamePool, GameSettings, Installation, StarCraft2, process::Launcher};
-use mackrl_skirmish::{EnemyBehaviour, Scenario, unit_types::UnitTypes};
+use mackrl_skirmish::{EnemyBehaviour, Scenario, SkirmishSettings, unit_types::UnitTypes};
 
 /// Games at once where nothing else limits them.
 const PARALLEL_GAMES: usize = 8;
 
-/// The worlds that a run is played in.
-pub(crate) fn world(config: &Config) -> Result<World, Error> {
-    let source: Arc<dyn WorldSource> = match config.env.engine {
-        Engine::Simulator => Arc::new(Simulator),
-        Engine::Sc2 => Arc::new(StarCraftWorlds {
-            parallel_max: config.learner.environments,
-            ..StarCraftWorlds::default()
-        }),
-    };
-    World::from_source(config, source)
+/// The world that a run is played in.
+pub(crate) fn world(config: &Config) -> Result<assembly::World, Error> {
+    assembly::World::of(match config.env.engine {
+        Engine::Simulator => config.env.world()?,
+        Engine::Sc2 => Arc::new(StarCraftWorld::new(
+            &config.env,
+            config.learner.environments,
+        )?),
+    })
 }
 
-/// Where the worlds that `map` describes come from.
-pub(crate) fn worlds(map: &EnvironmentConfig) -> Box<dyn WorldSource> {
+/// The world that `map` describes.
+pub(crate) fn world_of(map: &EnvironmentConfig) -> Result<Arc<dyn World>, Error> {
     match map.engine {
-        Engine::Simulator => Box::new(Simulator),
-        Engine::Sc2 => Box::new(StarCraftWorlds::default()),
+        Engine::Simulator => map.world(),
+        Engine::Sc2 => Ok(Arc::new(StarCraftWorld::new(map, PARALLEL_GAMES)?)),
     }
 }
 
-/// Maps of StarCraft II, in games that are started when they are needed and shared by all worlds.
+/// A map of StarCraft II, in games that are started when they are needed and shared by all environments.
+///
+/// An environment is made anew, not copied: it holds a process.
 #[derive(Debug)]
-pub(super) struct StarCraftWorlds {
+pub(super) struct StarCraftWorld {
     parallel_max: usize,
-    pool: Mutex<Option<Arc<GamePool>>>,
+    scenario: Arc<Scenario>,
+    settings: SkirmishSettings,
+    data: String,
+    /// Of the game.
+    version: String,
+    spec: EnvironmentSpec,
+    prior: Arc<dyn PriorKnowledge>,
+    pool: Arc<GamePool>,
 }
 
-impl Default for StarCraftWorlds {
-    fn default() -> Self {
-        Self {
-            parallel_max: PARALLEL_GAMES,
-            pool: Mutex::default(),
-        }
-    }
-}
-
-impl StarCraftWorlds {
-    /// One world, with what only StarCraft II's have.
-    pub(super) fn star_craft(&self, config: &EnvironmentConfig) -> Result<StarCraft2, Error> {
+impl StarCraftWorld {
+    /// The world that `config` describes, played in by `parallel_max` environments at once. No game is started yet.
+    pub(super) fn new(config: &EnvironmentConfig, parallel_max: usize) -> Result<Self, Error> {
         if config.settings.enemy_order != EnemyBehaviour::Map {
             let message = "env.enemy_order is `hunt`, expected `map`: enemies in StarCraft II follow the order of their map";
             return Err(Error::Config(message.to_owned()));
         }
         let scenario = scenario(config)?;
-        let wrong = |error: &dyn std::error::Error| Error::Config(error.to_string());
-        StarCraft2::new(scenario, config.settings.clone(), self.pool(config)?)
-            .map_err(|error| wrong(&error))
+        let pool = Arc::new(GamePool::new(settings(&config.game_version)?));
+        let first = StarCraft2::new(
+            Arc::clone(&scenario),
+            config.settings.clone(),
+            Arc::clone(&pool),
+        )
+        .map_err(|error| Error::Config(error.to_string()))?;
+        Ok(Self {
+            parallel_max,
+            settings: config.settings.clone(),
+            data: config.data(),
+            version: pool.settings().installation.version(),
+            spec: first.spec().clone(),
+            prior: first.prior_knowledge(),
+            scenario,
+            pool,
+        })
     }
 
-    fn pool(&self, config: &EnvironmentConfig) -> Result<Arc<GamePool>, Error> {
-        let mut pool = self.pool.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(pool) = &*pool {
-            return Ok(Arc::clone(pool));
-        }
-        let made = Arc::new(GamePool::new(settings(&config.game_version)?));
-        *pool = Some(Arc::clone(&made));
-        Ok(made)
+    /// An environment, with what only StarCraft II's have.
+    pub(super) fn star_craft(&self) -> StarCraft2 {
+        let scenario = Arc::clone(&self.scenario);
+        StarCraft2::new(scenario, self.settings.clone(), Arc::clone(&self.pool))
+            .expect("the same was made when the world was built")
     }
 }
 
-impl WorldSource for StarCraftWorlds {
-    fn make(&self, config: &EnvironmentConfig) -> Result<Box<dyn Environment>, Error> {
-        Ok(Box::new(self.star_craft(config)?))
+impl World for StarCraftWorld {
+    fn kind(&self) -> &str {
+        "sc2"
+    }
+
+    fn spec(&self) -> &EnvironmentSpec {
+        &self.spec
+    }
+
+    fn prior_knowledge(&self) -> Arc<dyn PriorKnowledge> {
+        Arc::clone(&self.prior)
+    }
+
+    fn make(&self) -> Box<dyn Environment> {
+        Box::new(self.star_craft())
+    }
+
+    fn version(&self) -> &str {
+        &self.version
+    }
+
+    fn data(&self) -> &str {
+        &self.data
     }
 
     fn parallel_max(&self) -> Option<usize> {
         Some(self.parallel_max)
     }
 
-    fn counts(&self) -> Vec<(&'static str, u64)> {
-        let pool = self.pool.lock().unwrap_or_else(PoisonError::into_inner);
-        let Some(counts) = pool.as_ref().map(|pool| pool.counts()) else {
-            return Vec::new();
-        };
-        let names = [
-            "sys/game_faults_launch",
-            "sys/game_faults_version",
-            "sys/game_faults_late",
-            "sys/game_faults_closed",
-            "sys/game_faults_garbage",
-            "sys/game_faults_refused",
+    fn counters(&self) -> Vec<Counter> {
+        const FAULTS: [(&str, &str); 6] = [
+            (
+                "launch",
+                "games so far that did not start or did not listen",
+            ),
+            (
+                "version",
+                "games so far that were not the version that was asked for",
+            ),
+            ("late", "games so far that did not answer in time"),
+            ("closed", "games so far that went away"),
+            ("garbage", "games so far whose answer made no sense"),
+            ("refused", "games so far that refused what was asked"),
         ];
-        let faults = names.into_iter().filter_map(|name| {
-            let fault = counts.faults.iter().find(|(kind, _)| name.ends_with(kind));
-            fault.map(|(_, count)| (name, *count))
+        let counts = self.pool.counts();
+        let launches = Counter {
+            name: "game_launches".into(),
+            meaning: "processes of the game started so far".into(),
+            value: counts.launches,
+        };
+        let faults = FAULTS.into_iter().filter_map(|(kind, meaning)| {
+            let (_, count) = counts.faults.iter().find(|(name, _)| *name == kind)?;
+            Some(Counter {
+                name: format!("game_faults_{kind}").into(),
+                meaning: meaning.into(),
+                value: *count,
+            })
         });
-        [("sys/game_launches", counts.launches)]
-            .into_iter()
-            .chain(faults)
-            .collect()
+        [launches].into_iter().chain(faults).collect()
     }
 }
 

@@ -188,7 +188,7 @@ impl ConfigBuilder {
         if was_asked || config.policy.partitions != PartitionChoice::All {
             return None;
         }
-        let agents = config.env.make().ok()?.spec().agents;
+        let agents = config.env.world().ok()?.spec().agents;
         let too_many = agents > PartitionSchedule::MOST_AGENTS_ENUMERATED;
         too_many.then_some(PartitionChoice::RoundRobin)
     }
