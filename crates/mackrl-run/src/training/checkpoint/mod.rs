@@ -166,9 +166,7 @@ impl Numbers {
                 "checkpoint counts {found} as `{name}`, expected at most {most}"
             )));
         }
-        let unknown = interval
-            .names()
-            .find(|name| !is_explained(name));
+        let unknown = interval.names().find(|name| !is_explained(name));
         match unknown {
             Some(name) => Err(Error::Data(format!(
                 "checkpoint holds an unknown metric `{name}`"

@@ -16,7 +16,7 @@ use crate::{
     partition::PartitionSchedule,
 };
 
-pub use settings::{MackrlSettings, PartitionChoice};
+pub use settings::{Levels, MackrlSettings, PartitionChoice};
 
 /// The kind `mackrl`.
 #[derive(Debug, Clone, Copy, Default)]
@@ -87,6 +87,9 @@ impl AlgorithmKind for Mackrl {
     ) -> Result<toml::Table, SettingsError> {
         let (settings, learning) = Self::read(table)?;
         learning.check()?;
+        if settings.levels == Levels::Fours {
+            return settings.check_fours(table, spec);
+        }
         match settings.partitions.expected_of(spec.agents) {
             None => Ok(table.clone()),
             Some(expected) => Err(SettingsError::Wrong(WrongSetting {
@@ -114,6 +117,10 @@ impl AlgorithmKind for Mackrl {
             Preset {
                 name: "default",
                 text: include_str!("presets/default.toml"),
+            },
+            Preset {
+                name: "fours",
+                text: include_str!("presets/fours.toml"),
             },
             Preset {
                 name: "paper",

@@ -2,7 +2,10 @@
 
 use std::{fmt, str::FromStr};
 
-use mackrl_env::{declare_settings, settings::Accepts};
+use mackrl_env::{
+    EnvironmentSpec, declare_settings, declare_words,
+    settings::{Accepts, SettingsError, WrongSetting},
+};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -12,12 +15,27 @@ use crate::{
     policy::{Declaration, Delegation, Selection},
 };
 
+declare_words! {
+    /// The levels of groups between the team and single agents.
+    pub enum Levels {
+        /// Pairs, as in the paper.
+        #[default]
+        Pairs = "pairs",
+        /// Groups of four, which divide into pairs.
+        Fours = "fours",
+    }
+}
+
 declare_settings! {
     /// The controllers of the hierarchy.
     pub struct MackrlSettings {
         /// Which features of commonly known entities the controllers read: all of them, or those of the authors' code.
         common_knowledge: CommonKnowledgeFeatures = CommonKnowledgeFeatures::Complete, CommonKnowledgeFeatures::ACCEPTS;
-        /// Which partitions into pairs the pair selector chooses from. More than 8 agents have too many to take all; they take
+        /// The levels of groups between the team and single agents: pairs, as in the paper, or fours that divide into pairs. A four
+        /// chooses among its three partitions on what *it* commonly knows, which is more than what the whole team does; for at
+        /// most 8 agents.
+        levels: Levels = Levels::Pairs, Levels::ACCEPTS;
+        /// Which partitions into pairs the pair selector chooses from, where the team divides into pairs. More than 8 agents have too many to take all; they take
         /// `round-robin` unless something else is asked for.
         partitions: PartitionChoice = PartitionChoice::All, PartitionChoice::ACCEPTS;
         /// How a partition is chosen: the pair selector decides, or, as an ablation, all are equally likely.
@@ -28,13 +46,51 @@ declare_settings! {
 }
 
 impl MackrlSettings {
+    /// Checks what fours ask of a team and of the other settings.
+    pub(super) fn check_fours(
+        &self,
+        table: &toml::Table,
+        spec: &EnvironmentSpec,
+    ) -> Result<toml::Table, SettingsError> {
+        let most = PartitionSchedule::MOST_AGENTS_ENUMERATED;
+        let wrong = |name: &str, found: String, expected: String| {
+            SettingsError::Wrong(WrongSetting {
+                name: name.to_owned(),
+                found,
+                expected,
+                nearest: None,
+            })
+        };
+        if spec.agents > most {
+            let expected = format!(
+                "\"pairs\" for the {} agents of {}: only teams of at most {most} divide into fours",
+                spec.agents, spec.name
+            );
+            return Err(wrong("levels", "\"fours\"".to_owned(), expected));
+        }
+        if self.selector != Selection::Learned {
+            let expected = "\"learned\" where algorithm.levels is \"fours\"".to_owned();
+            return Err(wrong(
+                "selector",
+                format!("\"{}\"", self.selector.word()),
+                expected,
+            ));
+        }
+        Ok(table.clone())
+    }
+
     /// The hierarchy of a team of N agents with A actions each; sampled partitions are drawn from `seed`.
     ///
     /// # Errors
     /// [`Error::Config`] if the team is too large for the partitions.
     pub fn declaration(&self, team: [usize; 2], seed: u64) -> Result<Declaration, Error> {
-        let schedule = self.partitions.into();
-        Declaration::pairwise(team, schedule, self.selector, self.delegation, seed)
+        match self.levels {
+            Levels::Pairs => {
+                let schedule = self.partitions.into();
+                Declaration::pairwise(team, schedule, self.selector, self.delegation, seed)
+            }
+            Levels::Fours => Declaration::fours(team, self.delegation),
+        }
     }
 }
 
