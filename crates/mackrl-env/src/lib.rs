@@ -12,6 +12,13 @@
 //! Axes, used in the names of buffers: `B` environment, `N` agent, `M` entity, `A` action, `F` entity feature,
 //! `O` observation, `G` state.
 
+// Macros name this crate by its name, here too.
+extern crate self as mackrl_env;
+
+/// For the macros of [`settings`], so that a crate that uses them needs no version of its own.
+#[doc(hidden)]
+pub use serde;
+
 pub mod contract;
 mod entity_set;
 mod environment;

@@ -309,7 +309,8 @@ macro_rules! declare_words {
         }
     ) => {
         $(#[$attribute])*
-        #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+        #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, $crate::serde::Serialize, $crate::serde::Deserialize)]
+        #[serde(crate = "mackrl_env::serde")]
         pub enum $name {
             $(
                 $(#[$case_attribute])*
@@ -349,8 +350,8 @@ macro_rules! declare_settings {
         }
     ) => {
         $(#[$attribute])*
-        #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-        #[serde(default, deny_unknown_fields)]
+        #[derive(Debug, Clone, PartialEq, $crate::serde::Serialize, $crate::serde::Deserialize)]
+        #[serde(crate = "mackrl_env::serde", default, deny_unknown_fields)]
         $visibility struct $section {
             $(
                 $(#[doc = $meaning])+

@@ -18,7 +18,7 @@ use mackrl_env::{
 
 pub use actor_critic::{ActorCritic, ActorCriticSettings, OptimiserName};
 pub use central_v::CentralV;
-pub use mackrl::{Mackrl, MackrlSettings, PartitionChoice};
+pub use mackrl::{Levels, Mackrl, MackrlSettings, PartitionChoice};
 pub use state::{AlgorithmState, StoredState};
 
 use crate::{
