@@ -21,9 +21,11 @@ pub struct EnvironmentSpec {
     pub agents: usize,
     /// M: everything that can be seen, at most [`EntitySet::CAPACITY`].
     pub entities: usize,
-    /// F: features of an entity. The first two are its position (x, y) in map units; the others are attributes of about
-    /// unit size.
+    /// F: features of an entity: its position, then attributes of about unit size.
     pub entity_features: usize,
+    /// P: how many of the features, from the first on, are its position in map units, such as 2 for (x, y); 0 in worlds
+    /// without places. Controllers read positions relative to the members of their group.
+    pub position_features: usize,
     /// A: actions of an agent.
     pub actions: usize,
     /// O: length of an agent's observation vector.
@@ -64,6 +66,12 @@ impl EnvironmentSpec {
             count("entities", self.entities, 1, most_entities),
             count("agents", self.agents, 1, self.entities),
             count("features of an entity", self.entity_features, 1, ids),
+            count(
+                "features of a position",
+                self.position_features,
+                0,
+                self.entity_features,
+            ),
             count("actions", self.actions, 1, ids),
             count("steps of an episode", self.episode_limit, 1, usize::MAX),
         ];
@@ -233,6 +241,21 @@ pub trait Environment: Send {
     /// # Shapes
     /// `statistics_s` \[S\], in the order of [`EnvironmentSpec::statistics`]; all finite.
     fn statistics(&self, statistics_s: &mut [f64]);
+
+    /// Alters at random, by draws of `key`, what `agent` does not see, writes the observations of the state that results, and
+    /// says that it has done so. Worlds that offer no such alteration, or in which nothing is unseen at the moment, say no.
+    ///
+    /// The contract's test alone calls it, once in an episode that is not continued: an alteration may be one that no episode
+    /// leads to. What `agent` sees and observes has to stay the same, to the bit.
+    fn alter_unseen(
+        &mut self,
+        agent: AgentId,
+        key: EpisodeKey,
+        out: &mut ObservationMut<'_>,
+    ) -> bool {
+        let _ = (agent, key, out);
+        false
+    }
 }
 
 /// What is common knowledge before the game starts (τ₀ in the paper): everybody's field of view and the rules of availability.
@@ -240,6 +263,9 @@ pub trait Environment: Send {
 /// All methods are pure functions of features, so every agent computes the same answers from the same entities.
 pub trait PriorKnowledge: Send + Sync + Debug {
     /// μ^a(s^a, s^e): whether agent `observer` with features `observer_f` sees `entity` with features `entity_f`.
+    ///
+    /// It may depend on all features of both, on which agent looks, and on anything that never changes or is declared before
+    /// the game: walls, ranges of one's own, noise that is a function of these.
     ///
     /// # Shapes
     /// `observer_f` and `entity_f` have F elements each.
@@ -272,6 +298,7 @@ mod tests {
             agents: 3,
             entities: 128,
             entity_features: 2,
+            position_features: 2,
             actions: 5,
             observation_size: 0,
             state_size: 0,

@@ -27,6 +27,7 @@ pub mod matrix_game;
 mod observations;
 pub mod random;
 pub mod random_play;
+pub mod sanity;
 pub mod settings;
 mod world;
 
@@ -38,4 +39,4 @@ pub use environment::{
 pub use ids::{Action, AgentId, EntityId};
 pub use observations::{KnownEntities, LocalView, ObservationMut, Observations};
 pub use random::{Draw, EpisodeKey, Stream};
-pub use world::{Counter, Prototype, World, WorldError, WorldKind};
+pub use world::{Counter, DeclaredKind, Prototype, World, WorldError, WorldKind};

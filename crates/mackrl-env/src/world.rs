@@ -16,7 +16,7 @@ use thiserror::Error;
 
 use crate::{
     Environment, EnvironmentSpec, InvalidSpec, PriorKnowledge,
-    settings::{Setting, SettingsError},
+    settings::{Setting, Settings, SettingsError},
 };
 
 /// A kind of world: what stands under a name in a program's list of worlds.
@@ -183,6 +183,75 @@ impl<E: Environment> Debug for Prototype<E> {
             .field("kind", &self.kind)
             .field("version", &self.version)
             .field("spec", self.environment.spec())
+            .finish_non_exhaustive()
+    }
+}
+
+/// A kind of world that is a struct of declared settings and a function that builds an environment from it.
+///
+/// This is the short way to a kind of one's own:
+///
+/// ```
+/// use mackrl_env::{DeclaredKind, WorldKind, sanity::{Remember, RememberSettings}};
+///
+/// let kind = DeclaredKind::new("remember", "say again what was shown at first", |settings: RememberSettings| {
+///     Ok(Remember::new(settings))
+/// });
+/// let world = kind.build(&"delay = 4".parse().unwrap()).unwrap();
+/// assert_eq!(world.spec().episode_limit, 5);
+/// let refused = kind.build(&"delay = -1".parse().unwrap()).unwrap_err();
+/// assert_eq!(refused.to_string(), "setting `delay` is -1, expected an integer in [0, 1000]");
+/// ```
+pub struct DeclaredKind<S, E> {
+    name: &'static str,
+    summary: &'static str,
+    build: fn(S) -> Result<E, WorldError>,
+}
+
+impl<S: Settings, E: Environment + Clone + Sync + 'static> DeclaredKind<S, E> {
+    /// The kind called `name`, whose environments `build` makes.
+    #[must_use]
+    pub const fn new(
+        name: &'static str,
+        summary: &'static str,
+        build: fn(S) -> Result<E, WorldError>,
+    ) -> Self {
+        Self {
+            name,
+            summary,
+            build,
+        }
+    }
+}
+
+impl<S: Settings, E: Environment + Clone + Sync + 'static> WorldKind for DeclaredKind<S, E> {
+    fn name(&self) -> &str {
+        self.name
+    }
+
+    fn summary(&self) -> &str {
+        self.summary
+    }
+
+    fn settings(&self) -> Vec<Setting> {
+        S::DECLARED.to_vec()
+    }
+
+    fn defaults(&self) -> toml::Table {
+        S::defaults()
+    }
+
+    fn build(&self, table: &toml::Table) -> Result<Arc<dyn World>, WorldError> {
+        let environment = (self.build)(S::read(table)?)?;
+        Ok(Arc::new(Prototype::new(self.name, environment)?))
+    }
+}
+
+impl<S, E> Debug for DeclaredKind<S, E> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter
+            .debug_struct("DeclaredKind")
+            .field("name", &self.name)
             .finish_non_exhaustive()
     }
 }

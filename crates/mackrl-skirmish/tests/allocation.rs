@@ -82,7 +82,9 @@ fn whole_episodes_allocate_nothing_on_any_map() {
     };
     for name in mackrl_skirmish::map_names() {
         for settings in [&SkirmishSettings::default(), &everything] {
-            let mut skirmish = mackrl_skirmish::make(name, settings).expect("a shipped map");
+            // What is played in is a copy of what was built.
+            let built = mackrl_skirmish::make(name, settings).expect("a shipped map");
+            let mut skirmish = built.clone();
             let mut observations = Observations::new(skirmish.spec(), 1);
             let mut actions = vec![Action::default(); skirmish.spec().agents];
             for manner in [Manner::Random, Manner::Fierce] {

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use mackrl_env::{
-    Action, Environment, EnvironmentSpec, EpisodeKey, ObservationMut, PriorKnowledge, StepError,
-    Stream, TimeStep,
+    Action, AgentId, Draw, EntityId, Environment, EnvironmentSpec, EpisodeKey, ObservationMut,
+    PriorKnowledge, StepError, Stream, TimeStep,
 };
 
 use crate::{
@@ -160,4 +160,45 @@ impl Environment for Skirmish {
     fn statistics(&self, statistics_s: &mut [f64]) {
         statistics_s.copy_from_slice(&self.face.statistics().values());
     }
+
+    /// Moves living units that the agent does not see, as far as they stay unseen, and wounds them.
+    fn alter_unseen(
+        &mut self,
+        agent: AgentId,
+        key: EpisodeKey,
+        out: &mut ObservationMut<'_>,
+    ) -> bool {
+        const FARTHEST: f64 = 3.0;
+        let seen = out.visible_n[agent.index()];
+        let mut state = self.encounter.battle().state().clone();
+        let (x, y) = (state.x[agent.index()], state.y[agent.index()]);
+        let mut is_altered = false;
+        for unit in 0..state.units.len() {
+            if seen.is_empty()
+                || seen.contains(EntityId::new(unit))
+                || !state.units[unit].is_alive()
+            {
+                continue;
+            }
+            let uniform = |draw| key.uniform(self.face.steps(), Draw::Setup(3 * unit + draw));
+            let [dx, dy] = [0, 1].map(|draw| to_f32(FARTHEST * (2.0 * uniform(draw) - 1.0)));
+            let place = (state.x[unit] + dx, state.y[unit] + dy);
+            if !self.face.knowledge().is_in_sight(place.0 - x, place.1 - y) {
+                (state.x[unit], state.y[unit]) = place;
+            }
+            state.units[unit].life *= to_f32(1.0 - uniform(2));
+            is_altered = true;
+        }
+        self.encounter.battle.restore(&state);
+        self.face.write(&state, out);
+        is_altered
+    }
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "an alteration may be rounded"
+)]
+const fn to_f32(number: f64) -> f32 {
+    number as f32
 }

@@ -199,6 +199,7 @@ impl Layout {
             agents: self.agents,
             entities: self.agents + self.enemies,
             entity_features: self.entity_features(),
+            position_features: 2,
             actions: self.actions,
             observation_size: self.observation_size(),
             state_size: self.state_size(),

@@ -10,7 +10,7 @@ use crate::rules::{
 };
 
 /// A battle: what changes, on what does not.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Battle {
     pub(super) field: Arc<Battlefield>,
     pub(super) state: BattleState,
@@ -157,6 +157,19 @@ impl Battle {
         self.scratch.footing.resize(units, Footing::Standing);
         self.scratch.steps.resize(units);
         self.scratch.neighbours.reserve(units);
+    }
+}
+
+/// A copy has the room of its original, so that it allocates as little from its first loop on.
+impl Clone for Battle {
+    fn clone(&self) -> Self {
+        let mut battle = Self {
+            field: Arc::clone(&self.field),
+            state: self.state.clone(),
+            scratch: self.scratch.clone(),
+        };
+        battle.reserve(battle.state.units.len());
+        battle
     }
 }
 

@@ -1,5 +1,7 @@
 //! Where the units of a group appear: the places of a map, and how far from them a battle begins.
 
+use std::{collections::BTreeMap, sync::LazyLock};
+
 use crate::{
     rules::{Battle, BattleState, Chance, Profile, movement::Footing},
     terrain::Terrain,
@@ -40,29 +42,22 @@ pub fn spread_around(
     terrain: &Terrain,
     taken: &mut Vec<Taken>,
 ) -> Option<Vec<[f32; 2]>> {
-    let forward = [front[0] - point[0], front[1] - point[1]];
-    // Adding zero turns −0 into 0, so that places beside the point are equally far ahead for either army.
-    let ahead = |dy: i32, dx: i32| dx as f32 * forward[0] + dy as f32 * forward[1] + 0.0;
-    let mut offsets: Vec<(i32, i32)> = (-REACH..=REACH)
-        .flat_map(|dy| (-REACH..=REACH).map(move |dx| (dy, dx)))
-        .collect();
-    offsets.sort_by(|a, b| {
-        let square = |(dy, dx): (i32, i32)| dx * dx + dy * dy;
-        let front_first = ahead(b.0, b.1).total_cmp(&ahead(a.0, a.1));
-        square(*a).cmp(&square(*b)).then(front_first).then(a.cmp(b))
-    });
+    let mut offsets = Offsets::new([front[0] - point[0], front[1] - point[1]]);
     profiles
         .iter()
         .map(|profile| {
-            let place = offsets
-                .iter()
-                .map(|&(dy, dx)| {
-                    [
-                        point[0] + dx as f32 * LATTICE,
-                        point[1] + dy as f32 * LATTICE,
-                    ]
-                })
-                .find(|place| is_free(*place, profile, terrain, taken))?;
+            let mut tried = 0;
+            let place = loop {
+                let (dy, dx) = offsets.get(tried)?;
+                let place = [
+                    point[0] + dx as f32 * LATTICE,
+                    point[1] + dy as f32 * LATTICE,
+                ];
+                if is_free(place, profile, terrain, taken) {
+                    break place;
+                }
+                tried += 1;
+            };
             taken.push(Taken {
                 at: place,
                 radius: profile.separation_radius,
@@ -71,6 +66,55 @@ pub fn spread_around(
             Some(place)
         })
         .collect()
+}
+
+/// Steps (dy, dx) on the lattice from a point, the nearest first, and of equally near ones those that lead forward.
+///
+/// A group stands within a few rings of its point, so a ring is sorted when it is reached: sorting the whole lattice took
+/// nine tenths of the time in which a world is built.
+struct Offsets {
+    forward: [f32; 2],
+    /// Those of the rings reached so far.
+    sorted: Vec<(i32, i32)>,
+    rings: std::slice::Iter<'static, Vec<(i32, i32)>>,
+}
+
+impl Offsets {
+    fn new(forward: [f32; 2]) -> Self {
+        Self {
+            forward,
+            sorted: Vec::new(),
+            rings: rings().iter(),
+        }
+    }
+
+    /// Number `index` of them, unless all have been given.
+    fn get(&mut self, index: usize) -> Option<(i32, i32)> {
+        while index >= self.sorted.len() {
+            let [x, y] = self.forward;
+            // Adding zero turns −0 into 0, so that places beside the point are equally far ahead for either army.
+            let ahead = |(dy, dx): (i32, i32)| dx as f32 * x + dy as f32 * y + 0.0;
+            let begin = self.sorted.len();
+            self.sorted.extend(self.rings.next()?);
+            self.sorted[begin..].sort_by(|a, b| ahead(*b).total_cmp(&ahead(*a)));
+        }
+        Some(self.sorted[index])
+    }
+}
+
+/// The steps (dy, dx) on the lattice that are equally long, for every length from 0 on; of these, those of smaller dy first,
+/// then those of smaller dx.
+fn rings() -> &'static [Vec<(i32, i32)>] {
+    static RINGS: LazyLock<Vec<Vec<(i32, i32)>>> = LazyLock::new(|| {
+        let mut rings = BTreeMap::<i32, Vec<(i32, i32)>>::new();
+        for dy in -REACH..=REACH {
+            for dx in -REACH..=REACH {
+                rings.entry(dx * dx + dy * dy).or_default().push((dy, dx));
+            }
+        }
+        rings.into_values().collect()
+    });
+    &RINGS
 }
 
 impl Battle {
@@ -131,4 +175,29 @@ fn off_walls([x, y]: [f32; 2], profile: &Profile, terrain: &Terrain) -> (f32, f3
         || Terrain::within_map(x, y),
         |terrain| terrain.pushed_out_of_walls(x, y, profile.inner_radius),
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rings_in_turn_are_the_whole_lattice_sorted_at_once() {
+        for forward in [[0.0, 0.0], [1.0, 0.0], [-0.0, -7.5], [13.25, 4.0]] {
+            let mut expected: Vec<(i32, i32)> = (-REACH..=REACH)
+                .flat_map(|dy| (-REACH..=REACH).map(move |dx| (dy, dx)))
+                .collect();
+            let ahead = |dy: i32, dx: i32| dx as f32 * forward[0] + dy as f32 * forward[1] + 0.0;
+            expected.sort_by(|a, b| {
+                let square = |(dy, dx): (i32, i32)| dx * dx + dy * dy;
+                let front_first = ahead(b.0, b.1).total_cmp(&ahead(a.0, a.1));
+                square(*a).cmp(&square(*b)).then(front_first).then(a.cmp(b))
+            });
+            let mut offsets = Offsets::new(forward);
+            for (index, step) in expected.iter().enumerate() {
+                assert_eq!(offsets.get(index), Some(*step), "{forward:?}, {index}");
+            }
+            assert_eq!(offsets.get(expected.len()), None);
+        }
+    }
 }

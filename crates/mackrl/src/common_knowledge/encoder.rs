@@ -9,12 +9,6 @@ use mackrl_env::{
     AgentId, EntityId, EnvironmentSpec, KnownEntities, PriorKnowledge, declare_words,
 };
 
-/// Columns that the features of an entity begin with: its position (x, y).
-const POSITION: usize = 2;
-/// Numbers about an entity relative to a member: known, distance, Δx, Δy.
-const RELATIVE: usize = 4;
-/// Numbers about an enemy in the thin features: attack by the first member, distance, Δx, Δy, attack by the second.
-const THIN_ENEMY: usize = 5;
 /// What the thin features hold in place of anything that is not commonly known.
 const MISSING: f32 = -1.0;
 
@@ -33,12 +27,13 @@ declare_words! {
 /// Turns the common knowledge of groups of one size into controller inputs.
 ///
 /// # Shapes
-/// With G members, M entities, F features and A actions, an input has
+/// With G members, M entities, F features of which P are the position, and A actions, an input has, where P = 2,
 /// - complete: G·(4·M + A) + M·(F − 2) numbers: for each member and entity \[known, distance, Δx, Δy\]; then for each
 ///   entity its attributes; then for each member its available actions;
-/// - thin: G·(5·enemies + 4·N) numbers, as [`CommonKnowledgeFeatures::Thin`] of the published code.
+/// - thin: G·(5·enemies + 4·N) numbers, as [`CommonKnowledgeFeatures::Thin`] of the published code: for each enemy
+///   \[attack by the first member, distance, Δx, Δy, attack by the second\], for each agent \[known, distance, Δx, Δy\].
 ///
-/// Distances are divided by [`EnvironmentSpec::distance_scale`].
+/// With other P there are as many Δ, and without positions no distance either. Distances are divided by [`EnvironmentSpec::distance_scale`].
 #[derive(Clone)]
 pub struct GroupEncoder {
     features: CommonKnowledgeFeatures,
@@ -46,6 +41,7 @@ pub struct GroupEncoder {
     agents: usize,
     entities: usize,
     entity_features: usize,
+    position_features: usize,
     actions: usize,
     distance_scale: f32,
     prior: Arc<dyn PriorKnowledge>,
@@ -53,9 +49,6 @@ pub struct GroupEncoder {
 
 impl GroupEncoder {
     /// An encoder for groups of `group_size` agents.
-    ///
-    /// # Panics
-    /// If entities have no position (F < 2).
     #[must_use]
     pub fn new(
         features: CommonKnowledgeFeatures,
@@ -63,16 +56,13 @@ impl GroupEncoder {
         spec: &EnvironmentSpec,
         prior: Arc<dyn PriorKnowledge>,
     ) -> Self {
-        assert!(
-            spec.entity_features >= POSITION,
-            "the features of an entity begin with its position"
-        );
         Self {
             features,
             group_size,
             agents: spec.agents,
             entities: spec.entities,
             entity_features: spec.entity_features,
+            position_features: spec.position_features,
             actions: spec.actions,
             distance_scale: spec.distance_scale,
             prior,
@@ -85,15 +75,30 @@ impl GroupEncoder {
         let enemies = self.entities - self.agents;
         self.group_size
             * match self.features {
-                CommonKnowledgeFeatures::Complete => RELATIVE * self.entities + self.actions,
-                CommonKnowledgeFeatures::Thin => THIN_ENEMY * enemies + RELATIVE * self.agents,
+                CommonKnowledgeFeatures::Complete => self.relative() * self.entities + self.actions,
+                CommonKnowledgeFeatures::Thin => {
+                    self.thin_enemy() * enemies + self.relative() * self.agents
+                }
             }
             + match self.features {
                 CommonKnowledgeFeatures::Complete => {
-                    self.entities * (self.entity_features - POSITION)
+                    self.entities * (self.entity_features - self.position_features)
                 }
                 CommonKnowledgeFeatures::Thin => 0,
             }
+    }
+
+    /// Numbers about an entity relative to a member: known, and where there are positions distance and Δ.
+    const fn relative(&self) -> usize {
+        match self.position_features {
+            0 => 1,
+            axes => 2 + axes,
+        }
+    }
+
+    /// Numbers about an enemy in the thin features: attack by the first member, distance and Δ, attack by the second.
+    const fn thin_enemy(&self) -> usize {
+        1 + self.relative()
     }
 
     /// Writes which actions of each member are commonly known to be available; none if nothing is commonly known.
@@ -163,22 +168,24 @@ impl GroupEncoder {
         available_ga: &[bool],
         out_f: &mut [f32],
     ) {
-        let attributes = self.entity_features - POSITION;
-        let (places, rest) = out_f.split_at_mut(self.group_size * self.entities * RELATIVE);
+        let attributes = self.entity_features - self.position_features;
+        let relative = self.relative();
+        let (places, rest) = out_f.split_at_mut(self.group_size * self.entities * relative);
         let (attributes_mf, actions) = rest.split_at_mut(self.entities * attributes);
         for (&member, place_m) in group
             .iter()
-            .zip(places.chunks_mut(self.entities * RELATIVE))
+            .zip(places.chunks_mut(self.entities * relative))
         {
-            for (entity, place) in place_m.chunks_mut(RELATIVE).enumerate() {
-                let relative = self.relative(known, member, EntityId::new(entity));
-                place.copy_from_slice(&relative.unwrap_or([0.0; RELATIVE]));
+            for (entity, place) in place_m.chunks_mut(relative).enumerate() {
+                if !self.write_relative(known, member, EntityId::new(entity), place) {
+                    place.fill(0.0);
+                }
             }
         }
         for entity in 0..self.entities {
             let attributes_f = &mut attributes_mf[entity * attributes..(entity + 1) * attributes];
             match known.get(EntityId::new(entity)) {
-                Some(features) => attributes_f.copy_from_slice(&features[POSITION..]),
+                Some(features) => attributes_f.copy_from_slice(&features[self.position_features..]),
                 None => attributes_f.fill(0.0),
             }
         }
@@ -195,41 +202,50 @@ impl GroupEncoder {
         out_f: &mut [f32],
     ) {
         out_f.fill(MISSING);
-        let per_member = THIN_ENEMY * (self.entities - self.agents) + RELATIVE * self.agents;
+        let thin_enemy = self.thin_enemy();
+        let enemy_numbers = thin_enemy * (self.entities - self.agents);
+        let per_member = enemy_numbers + self.relative() * self.agents;
         for (&member, block) in group.iter().zip(out_f.chunks_mut(per_member)) {
-            let (enemies, allies) = block.split_at_mut(THIN_ENEMY * (self.entities - self.agents));
+            let (enemies, allies) = block.split_at_mut(enemy_numbers);
             let enemy_ids = (self.agents..self.entities).map(EntityId::new);
-            for (enemy, slot) in enemy_ids.zip(enemies.chunks_mut(THIN_ENEMY)) {
-                let Some([_, distance, dx, dy]) = self.relative(known, member, enemy) else {
-                    continue;
-                };
-                let attack = |i| self.attack_flag(i, enemy, available_ga);
-                slot.copy_from_slice(&[attack(0), distance, dx, dy, attack(1)]);
+            for (enemy, slot) in enemy_ids.zip(enemies.chunks_mut(thin_enemy)) {
+                let (place, attack) = slot.split_at_mut(thin_enemy - 1);
+                if self.write_relative(known, member, enemy, place) {
+                    place[0] = self.attack_flag(0, enemy, available_ga);
+                    attack[0] = self.attack_flag(1, enemy, available_ga);
+                }
             }
             let others = (0..self.agents)
                 .map(AgentId::new)
                 .filter(|ally| !group.contains(ally));
             let ally_ids = group.iter().copied().chain(others);
-            for (ally, slot) in ally_ids.zip(allies.chunks_mut(RELATIVE)) {
-                if let Some(relative) = self.relative(known, member, ally.into()) {
-                    slot.copy_from_slice(&relative);
-                }
+            for (ally, slot) in ally_ids.zip(allies.chunks_mut(self.relative())) {
+                self.write_relative(known, member, ally.into(), slot);
             }
         }
     }
 
-    /// \[1, distance, Δx, Δy\] of `entity` from `member`, scaled, if both are known.
-    fn relative(
+    /// Writes \[1, distance, Δ…\] of `entity` from `member`, scaled, if both are known; says whether they are.
+    fn write_relative(
         &self,
         known: KnownEntities<'_>,
         member: AgentId,
         entity: EntityId,
-    ) -> Option<[f32; RELATIVE]> {
-        let from = known.get(member)?;
-        let to = known.get(entity)?;
-        let dx = (to[0] - from[0]) / self.distance_scale;
-        let dy = (to[1] - from[1]) / self.distance_scale;
-        Some([1.0, (dx * dx + dy * dy).sqrt(), dx, dy])
+        relative: &mut [f32],
+    ) -> bool {
+        let (Some(from), Some(to)) = (known.get(member), known.get(entity)) else {
+            return false;
+        };
+        relative[0] = 1.0;
+        if let [_, distance, deltas @ ..] = relative {
+            let mut square = 0.0;
+            for ((delta, from), to) in deltas.iter_mut().zip(from).zip(to) {
+                *delta = (to - from) / self.distance_scale;
+                square += *delta * *delta;
+            }
+            *distance = square.sqrt();
+        }
+        true
     }
 
     /// Whether the `i`-th member can act on `entity`, as a number; missing if the group has no such member.

@@ -40,6 +40,9 @@ impl Plain {
             state_size: 1,
             episode_limit: 1,
             distance_scale: 8.0,
+            position_features: 2,
+            statistics: Vec::new(),
+            success: None,
         }
     }
 

@@ -1,18 +1,47 @@
 //! The test that every environment has to pass.
+//!
+//! What a world promises about a state that it shows is checked at every step. What it promises about states that it does not
+//! show, that they change nothing for an agent who does not see the difference, is checked on pairs of states
+//! ([`Coverage`]): decentralised execution, and the certificate of it, rest on that.
+
+mod sight;
+
+#[cfg(test)]
+mod tests;
 
 use crate::{
     Action, AgentId, Draw, EntityId, EntitySet, Environment, EpisodeKey, IllegalAction,
     Observations, Stream,
 };
 
+/// How often two states were compared that differ only beyond an agent's sight.
+///
+/// Whether they ever do depends on the world: where everybody sees everything, both stay 0.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Coverage {
+    /// Steps after which agents whom the observer had not seen since had acted otherwise.
+    pub other_actions: u64,
+    /// States that [`Environment::alter_unseen`] had changed.
+    pub alterations: u64,
+}
+
 /// Plays `episodes` episodes with random available actions and checks every promise of [`Environment`] and
 /// [`crate::PriorKnowledge`] at every step.
 ///
+/// That nothing beyond an agent's sight changes its observation is checked in two ways: an episode is played again with other
+/// actions of agents whom it does not see, for as long as it sees none of them and what it sees stays the same; and states are
+/// altered by the world's own [`Environment::alter_unseen`]. The first needs nothing of the world; the second finds leaks of
+/// what no agent acts upon.
+///
 /// # Panics
 /// With a sentence that names the broken promise, the episode and the step.
-pub fn check_environment(environment: &mut dyn Environment, episodes: u64) {
+pub fn check_environment(environment: &mut dyn Environment, episodes: u64) -> Coverage {
     let spec = environment.spec().clone();
+    if let Err(problem) = spec.validate() {
+        panic!("{problem}");
+    }
     let mut observations = Observations::new(&spec, 1);
+    let mut coverage = Coverage::default();
     for episode in 0..episodes {
         let key = EpisodeKey::new(11, Stream::Other, episode);
         let first = play(environment, key, &mut observations);
@@ -22,17 +51,37 @@ pub fn check_environment(environment: &mut dyn Environment, episodes: u64) {
             "{}: episode {episode} differs when repeated",
             spec.name
         );
+        sight::check(environment, key, &first, &mut coverage);
     }
+    coverage
 }
 
-/// Plays one episode; returns what has to be the same when it is played again.
+/// An episode as it was played: what has to be the same when it is played again.
+#[derive(Debug, PartialEq)]
+struct Recorded {
+    /// Before each step, and after the last \[T + 1\].
+    observations_t: Vec<Observations>,
+    /// What was done \[T\].
+    actions_t: Vec<Vec<Action>>,
+    /// What it paid \[T\].
+    reward_t: Vec<f32>,
+    /// What was reported of it \[S\].
+    statistics_s: Vec<f64>,
+}
+
+/// Plays one episode.
 fn play(
     environment: &mut dyn Environment,
     key: EpisodeKey,
     observations: &mut Observations,
-) -> (Vec<f32>, Observations) {
+) -> Recorded {
     let spec = environment.spec().clone();
-    let mut rewards = Vec::new();
+    let mut recorded = Recorded {
+        observations_t: Vec::new(),
+        actions_t: Vec::new(),
+        reward_t: Vec::new(),
+        statistics_s: vec![f64::NAN; spec.statistics.len()],
+    };
     environment.reset(key, &mut observations.row_mut(0));
     check_observations(
         environment,
@@ -41,6 +90,7 @@ fn play(
     );
     for step in 0..spec.episode_limit {
         let place = format!("{}, episode {}, step {step}", spec.name, key.episode);
+        recorded.observations_t.push(observations.clone());
         check_illegal_action(environment, observations, &place);
         let actions: Vec<Action> = (0..spec.agents)
             .map(|agent| random_action(observations, agent, key.uniform(step, Draw::Agent(agent))))
@@ -53,10 +103,18 @@ fn play(
             "{place}: reward {}",
             time_step.reward
         );
-        rewards.push(time_step.reward);
+        recorded.reward_t.push(time_step.reward);
+        recorded.actions_t.push(actions);
         check_observations(environment, observations, &place);
         if time_step.end.is_some() {
-            return (rewards, observations.clone());
+            recorded.observations_t.push(observations.clone());
+            environment.statistics(&mut recorded.statistics_s);
+            assert!(
+                recorded.statistics_s.iter().all(|x| x.is_finite()),
+                "{place}: a statistic is not finite: {:?}",
+                recorded.statistics_s
+            );
+            return recorded;
         }
     }
     panic!(
