@@ -6,9 +6,11 @@
 //! parameters, in one place, for every objective alike.
 
 mod average;
+mod entropy_regularised;
 mod policy_gradient;
 mod returns;
 
 pub use average::LossAverage;
+pub use entropy_regularised::entropy_regularised;
 pub use policy_gradient::policy_gradient;
 pub use returns::{ReturnSettings, generalised_advantages, lambda_returns};

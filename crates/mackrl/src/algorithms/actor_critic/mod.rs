@@ -19,7 +19,7 @@ use crate::{
     experience::{Episode, Piece},
     hierarchy::Hierarchy,
     nn::{Optimiser, ParameterLayout, finite_step, first_not_finite},
-    objectives::policy_gradient,
+    objectives::{entropy_regularised, policy_gradient},
     parallel::for_each_in_parallel,
     policy::{Behaviour, Parameters, Policy, Tally},
 };
@@ -169,8 +169,9 @@ impl ActorCritic {
             })
             .collect();
         let (hierarchy, parameters) = (&self.hierarchy, &self.parameters);
+        let entropy_weight = Real::from_f64(self.settings.entropy_weight);
         for_each_in_parallel(self.threads, &mut work, |work| {
-            work.outcome = work.differentiate(hierarchy, parameters, &weight_t);
+            work.outcome = work.differentiate(hierarchy, parameters, &weight_t, entropy_weight);
         });
         let mut loss = 0.0;
         for work in work {
@@ -193,16 +194,23 @@ impl Work<'_> {
         hierarchy: &Hierarchy,
         parameters: &Parameters,
         weight_t: &[f32],
+        entropy_weight: f32,
     ) -> Result<f64, Error> {
         self.gradient.fill(0.0);
         let (experience, activations) = hierarchy.evaluate(parameters, self.piece)?;
         let mut d_log_p_bt = Vec::new();
-        let loss = policy_gradient(
-            activations.log_p_bt(),
-            self.advantage_bt,
-            weight_t,
-            &mut d_log_p_bt,
-        );
+        let log_p_bt = activations.log_p_bt();
+        let loss = if entropy_weight > 0.0 {
+            entropy_regularised(
+                log_p_bt,
+                self.advantage_bt,
+                weight_t,
+                entropy_weight,
+                &mut d_log_p_bt,
+            )
+        } else {
+            policy_gradient(log_p_bt, self.advantage_bt, weight_t, &mut d_log_p_bt)
+        };
         hierarchy.backward(
             parameters,
             experience,

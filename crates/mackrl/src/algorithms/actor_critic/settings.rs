@@ -60,6 +60,9 @@ declare_settings! {
         /// What a step counts for in the policy's loss: all steps of a batch alike, or, as in the authors' code, those of each time
         /// slot together as much as those of another, so that late steps of long episodes count for more.
         loss_average: LossAverage = LossAverage::Steps, LossAverage::ACCEPTS;
+        /// Weight τ of the entropy of the joint action beside the return; 0 is the paper's objective (eq. 6). Advantages are of the
+        /// size of rewards, so that useful weights are small: .001 and less.
+        entropy_weight: f64 = 0.0, Accepts::within(0.0, 1.0);
         /// Environments that run side by side; each gives one episode to an update.
         environments: usize = 8, Accepts::integer(1, 4096);
         /// Pieces into which the environments are cut for work in parallel; as many threads as this can be used. It decides the

@@ -90,18 +90,19 @@ fn learned(sizes: NetworkSizes, rows: usize) -> Vec<u64> {
         for update in 0..2 {
             let weights = network.weights(&parameters);
             trace.begin_episode();
+            let mut inputs = Vec::new();
             for t in 0..STEPS {
                 trace.begin_step(rows, None);
-                let inputs = numbers::<f32>(rows * sizes.inputs, 10 * update + t);
-                trace.input_mut().copy_from_slice(&inputs);
-                network.step(&weights, &mut trace);
+                let x = numbers::<f32>(rows * sizes.inputs, 10 * update + t);
+                network.step(&weights, &x, &mut trace);
+                inputs.extend(x);
             }
             for t in 0..STEPS {
                 let of_logits = numbers::<f32>(rows * sizes.outputs, 100 + 10 * update + t);
                 trace.logits_gradient_mut(t).copy_from_slice(&of_logits);
             }
             gradient.fill(0.0);
-            network.backward(&weights, &mut trace, &mut gradient);
+            network.backward(&weights, &inputs, &mut trace, &mut gradient);
             results.push(clip_gradient_norm(&mut gradient, 1.0).to_bits());
             optimiser.step(0.01, &gradient, &mut parameters);
         }

@@ -1,0 +1,2 @@
+mod world;
+fn main() {}
