@@ -41,6 +41,13 @@ pub trait Lanes: Copy {
     fn where_positive(self, condition: Self::Vector, value: Self::Vector) -> Self::Vector;
     /// `value` where `condition` > −∞, else −∞.
     fn where_possible(self, condition: Self::Vector, value: Self::Vector) -> Self::Vector;
+    /// Copies the numbers that are available, and puts −∞ elsewhere.
+    fn copy_where(
+        self,
+        available: &[bool; BLOCK],
+        from: &[Self::Element; BLOCK],
+        to: &mut [Self::Element; BLOCK],
+    );
     /// eˣ
     fn exp(self, x: Self::Vector) -> Self::Vector;
     /// ln x
@@ -51,28 +58,9 @@ pub trait Lanes: Copy {
     fn sigmoid(self, x: Self::Vector) -> Self::Vector;
 
     /// The first numbers of a slice, and zeros where it is shorter than a vector.
-    #[inline(always)]
-    fn load(self, slice: &[Self::Element]) -> Self::Vector {
-        if let Some(vector) = Self::vectors(slice).first() {
-            return *vector;
-        }
-        let mut padded = [Self::Element::ZERO; BLOCK];
-        padded[..slice.len()].copy_from_slice(slice);
-        Self::vectors(&padded)[0]
-    }
-
+    fn load(self, slice: &[Self::Element]) -> Self::Vector;
     /// Overwrites the first numbers of a slice, as many as it has.
-    #[inline(always)]
-    fn store(self, slice: &mut [Self::Element], vector: Self::Vector) {
-        if let Some(place) = Self::vectors_mut(slice).first_mut() {
-            *place = vector;
-            return;
-        }
-        let mut padded = [Self::Element::ZERO; BLOCK];
-        Self::vectors_mut(&mut padded)[0] = vector;
-        let length = slice.len();
-        slice.copy_from_slice(&padded[..length]);
-    }
+    fn store(self, slice: &mut [Self::Element], vector: Self::Vector);
 }
 
 /// A computation that is written once for every width.
@@ -124,6 +112,20 @@ impl<S: Simd> Lanes for Vectors<S> {
         S::as_mut_simd_f32s(slice).0
     }
     #[inline(always)]
+    fn load(self, slice: &[f32]) -> S::f32s {
+        match S::as_simd_f32s(slice).0.first() {
+            Some(vector) => *vector,
+            None => self.0.partial_load_f32s(slice),
+        }
+    }
+    #[inline(always)]
+    fn store(self, slice: &mut [f32], vector: S::f32s) {
+        match S::as_mut_simd_f32s(slice).0.first_mut() {
+            Some(place) => *place = vector,
+            None => self.0.partial_store_f32s(slice, vector),
+        }
+    }
+    #[inline(always)]
     fn splat(self, value: f32) -> S::f32s {
         self.0.splat_f32s(value)
     }
@@ -154,6 +156,18 @@ impl<S: Simd> Lanes for Vectors<S> {
         let impossible = self.0.splat_f32s(f32::NEG_INFINITY);
         let mask = self.0.equal_f32s(condition, impossible);
         self.0.select_f32s(mask, impossible, value)
+    }
+    #[inline(always)]
+    fn copy_where(self, available: &[bool; BLOCK], from: &[f32; BLOCK], to: &mut [f32; BLOCK]) {
+        // Not a choice for each number, which becomes a jump that cannot be predicted.
+        let flags = available.map(u32::from);
+        let zero = self.0.splat_u32s(0);
+        let impossible = self.0.splat_f32s(f32::NEG_INFINITY);
+        let sources = S::as_simd_u32s(&flags).0.iter().zip(Self::vectors(from));
+        for (to, (&flags, &from)) in Self::vectors_mut(to).iter_mut().zip(sources) {
+            let mask = self.0.greater_than_u32s(flags, zero);
+            *to = self.0.select_f32s(mask, from, impossible);
+        }
     }
     #[inline(always)]
     fn exp(self, x: S::f32s) -> S::f32s {
@@ -188,6 +202,14 @@ impl Lanes for OneByOne {
     fn vectors_mut(slice: &mut [f64]) -> &mut [f64] {
         slice
     }
+    fn load(self, slice: &[f64]) -> f64 {
+        slice.first().copied().unwrap_or_default()
+    }
+    fn store(self, slice: &mut [f64], vector: f64) {
+        if let Some(place) = slice.first_mut() {
+            *place = vector;
+        }
+    }
     fn splat(self, value: f64) -> f64 {
         value
     }
@@ -211,6 +233,11 @@ impl Lanes for OneByOne {
             f64::NEG_INFINITY
         } else {
             value
+        }
+    }
+    fn copy_where(self, available: &[bool; BLOCK], from: &[f64; BLOCK], to: &mut [f64; BLOCK]) {
+        for ((to, &from), &available) in to.iter_mut().zip(from).zip(available) {
+            *to = if available { from } else { f64::NEG_INFINITY };
         }
     }
     fn exp(self, x: f64) -> f64 {

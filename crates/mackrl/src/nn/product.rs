@@ -178,15 +178,19 @@ impl<E: Element> Product<'_, E> {
         let inner = self.b.inner;
         let length = (self.b.columns - column).min(VECTORS * L::LANES);
         let mut sums = [[lanes.splat(E::ZERO); VECTORS]; ROWS];
-        for (i, sum) in sums.iter_mut().enumerate() {
-            match self.start {
-                Start::Bias(bias) => load_row(lanes, &bias[column..][..length], sum),
-                Start::Kept => {
+        match self.start {
+            Start::Bias(bias) => {
+                let mut first = sums[0];
+                load_row(lanes, &bias[column..][..length], &mut first);
+                sums = [first; ROWS];
+            }
+            Start::Kept => {
+                for (i, sum) in sums.iter_mut().enumerate() {
                     let place = (row + i) * self.c_stride + column;
                     load_row(lanes, &self.c[place..][..length], sum);
                 }
-                Start::Zero => {}
             }
+            Start::Zero => {}
         }
         let mut a: [&[E]; ROWS] = [&[]; ROWS];
         for (i, a) in a.iter_mut().enumerate() {

@@ -70,22 +70,13 @@ impl<E: Element> MaskedLogSoftmax<E> {
         weights: &[(usize, E)],
         gradient: &mut [E],
     ) {
-        let direct = |&(column, weight): &(usize, E)| {
-            if log_p[column] == E::NEG_INFINITY {
-                E::ZERO
-            } else if self.epsilon == E::ZERO {
-                weight
-            } else {
-                weight * (E::ONE - self.epsilon) * softmax[column] * (-log_p[column]).exp()
-            }
-        };
-        let total: E = weights.iter().map(direct).sum();
-        for (gradient, &s) in gradient.iter_mut().zip(softmax) {
-            *gradient = -(s * total);
-        }
-        for entry in weights {
-            gradient[entry.0] += direct(entry);
-        }
+        E::dispatch(RowGradient {
+            law: *self,
+            log_p,
+            softmax,
+            weights,
+            gradient,
+        });
     }
 
     /// The entropy −Σ p log p of one row of log-probabilities, in nats.
@@ -126,7 +117,7 @@ impl<E: Element> Kernel<E> for Forward<'_, E> {
             .chunks_exact_mut(columns)
             .zip(self.softmax.chunks_exact_mut(columns));
         for ((logits, mask), (log_p, softmax)) in sources.zip(results) {
-            let highest = mask_row(logits, mask, log_p);
+            let highest = mask_row(lanes, logits, mask, log_p);
             if highest == E::NEG_INFINITY {
                 softmax.fill(E::ZERO);
                 continue;
@@ -153,32 +144,54 @@ impl<E: Element> Kernel<E> for Forward<'_, E> {
 
 /// Copies the available logits, puts −∞ elsewhere and gives the highest.
 #[inline(always)]
-fn mask_row<E: Element>(logits: &[E], mask: &[bool], masked: &mut [E]) -> E {
-    let mut highest = [E::NEG_INFINITY; BLOCK];
-    let sources = logits.chunks(BLOCK).zip(mask.chunks(BLOCK));
-    for ((logits, mask), masked) in sources.zip(masked.chunks_mut(BLOCK)) {
-        for (((&logit, &available), masked), highest) in
-            logits.iter().zip(mask).zip(masked).zip(&mut highest)
-        {
-            *masked = if available { logit } else { E::NEG_INFINITY };
-            *highest = if *masked > *highest {
-                *masked
-            } else {
-                *highest
-            };
-        }
+fn mask_row<L: Lanes>(
+    lanes: L,
+    logits: &[L::Element],
+    mask: &[bool],
+    masked: &mut [L::Element],
+) -> L::Element {
+    let impossible = <L::Element as crate::Real>::NEG_INFINITY;
+    let mut highest = [impossible; BLOCK];
+    let (logits, last_logits) = logits.as_chunks();
+    let (mask, last_mask) = mask.as_chunks();
+    let (masked, last_masked) = masked.as_chunks_mut();
+    for ((logits, mask), masked) in logits.iter().zip(mask).zip(masked) {
+        lanes.copy_where(mask, logits, masked);
+        raise(&mut highest, masked);
+    }
+    let length = last_logits.len();
+    if length > 0 {
+        let (mut logits, mut mask) = ([impossible; BLOCK], [false; BLOCK]);
+        logits[..length].copy_from_slice(last_logits);
+        mask[..length].copy_from_slice(last_mask);
+        let mut masked = [impossible; BLOCK];
+        lanes.copy_where(&mask, &logits, &mut masked);
+        raise(&mut highest, &masked);
+        last_masked.copy_from_slice(&masked[..length]);
     }
     tree(highest, |a, b| if b > a { b } else { a })
+}
+
+/// The higher of two numbers in each place.
+#[inline(always)]
+fn raise<E: Element>(highest: &mut [E; BLOCK], numbers: &[E; BLOCK]) {
+    for (highest, &number) in highest.iter_mut().zip(numbers) {
+        *highest = if number > *highest { number } else { *highest };
+    }
 }
 
 /// The sum of a row in 16 parts, whatever the machine's width.
 #[inline(always)]
 fn row_sum<E: Element>(row: &[E]) -> E {
     let mut sums = [E::ZERO; BLOCK];
-    for part in row.chunks(BLOCK) {
+    let (whole, last) = row.as_chunks::<BLOCK>();
+    for part in whole {
         for (sum, &term) in sums.iter_mut().zip(part) {
             *sum += term;
         }
+    }
+    for (sum, &term) in sums.iter_mut().zip(last) {
+        *sum += term;
     }
     tree(sums, |a, b| a + b)
 }
@@ -223,5 +236,50 @@ fn explore<L: Lanes>(
     for (log_p, s) in log_p.chunks_mut(L::LANES).zip(softmax.chunks(L::LANES)) {
         let value = lanes.ln(lanes.mul_add(greedy, lanes.load(s), uniform));
         lanes.store(log_p, lanes.where_possible(lanes.load(log_p), value));
+    }
+}
+
+struct RowGradient<'a, R> {
+    law: MaskedLogSoftmax<R>,
+    log_p: &'a [R],
+    softmax: &'a [R],
+    weights: &'a [(usize, R)],
+    gradient: &'a mut [R],
+}
+
+impl<E: Element> RowGradient<'_, E> {
+    /// g_c for an entry of `weights`.
+    #[inline(always)]
+    fn direct<L: Lanes<Element = E>>(&self, lanes: L, &(column, weight): &(usize, E)) -> E {
+        let Self { law, log_p, .. } = self;
+        if log_p[column] == E::NEG_INFINITY {
+            E::ZERO
+        } else if law.epsilon == E::ZERO {
+            weight
+        } else {
+            let mut inverse = [E::ZERO];
+            lanes.store(&mut inverse, lanes.exp(lanes.splat(-log_p[column])));
+            weight * (E::ONE - law.epsilon) * self.softmax[column] * inverse[0]
+        }
+    }
+}
+
+impl<E: Element> Kernel<E> for RowGradient<'_, E> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes<Element = E>>(self, lanes: L) {
+        // Sums of floating-point numbers begin with −0.
+        let mut total = -E::ZERO;
+        for entry in self.weights {
+            total += self.direct(lanes, entry);
+        }
+        for (gradient, &s) in self.gradient.iter_mut().zip(self.softmax) {
+            *gradient = -(s * total);
+        }
+        for entry in self.weights {
+            let direct = self.direct(lanes, entry);
+            self.gradient[entry.0] += direct;
+        }
     }
 }

@@ -48,30 +48,40 @@ impl<E: Element> WeightGradient<'_, E> {
             }
         }
         if whole < self.columns {
-            self.rest(lanes, whole);
+            self.copied::<L, 1>(lanes, whole);
         }
     }
 
-    /// The last columns, fewer than 16: copied to a padded matrix first.
     #[inline(always)]
-    fn rest<L: Lanes<Element = E>>(&mut self, lanes: L, whole: usize) {
-        let length = self.columns - whole;
+    fn copies<L: Lanes<Element = E>, const VECTORS: usize>(mut self, lanes: L) {
+        for column in (0..self.columns).step_by(BLOCK) {
+            self.copied::<L, VECTORS>(lanes, column);
+        }
+    }
+
+    /// At most 16 columns, copied side by side first.
+    #[inline(always)]
+    fn copied<L: Lanes<Element = E>, const VECTORS: usize>(&mut self, lanes: L, column: usize) {
+        let length = (self.columns - column).min(BLOCK);
         let mut scratch = std::mem::take(self.scratch);
         scratch.grow(self.rows * BLOCK);
-        let padded = scratch.as_mut_slice().chunks_exact_mut(BLOCK);
-        for (padded, d) in padded
-            .zip(self.d.values.chunks(self.d.stride))
-            .take(self.rows)
-        {
-            padded[..length].copy_from_slice(&d[whole..][..length]);
-            padded[length..].fill(E::ZERO);
+        let (places, _) = scratch.as_mut_slice().as_chunks_mut::<BLOCK>();
+        let rows = self.d.values.chunks(self.d.stride).take(self.rows);
+        for (place, d) in places.iter_mut().zip(rows) {
+            match d[column..].first_chunk() {
+                Some(whole) => *place = *whole,
+                None => {
+                    place[..length].copy_from_slice(&d[column..][..length]);
+                    place[length..].fill(E::ZERO);
+                }
+            }
         }
         let d = Rows {
             values: scratch.as_slice(),
             stride: BLOCK,
         };
-        for first in (0..length).step_by(L::LANES) {
-            self.strip::<L, 1>(lanes, d, first, whole + first);
+        for first in (0..length).step_by(VECTORS * L::LANES) {
+            self.strip::<L, VECTORS>(lanes, d, first, column + first);
         }
         *self.scratch = scratch;
     }
@@ -143,6 +153,10 @@ impl<E: Element> Kernel<E> for WeightGradient<'_, E> {
     fn run<L: Lanes<Element = E>>(self, lanes: L) {
         if L::LANES == BLOCK {
             self.strips::<L, 4>(lanes);
+        } else if 2 * L::LANES == BLOCK {
+            self.copies::<L, 2>(lanes);
+        } else if 4 * L::LANES == BLOCK {
+            self.copies::<L, 4>(lanes);
         } else {
             self.strips::<L, 2>(lanes);
         }
