@@ -304,14 +304,14 @@ impl From<Violation> for SettingsError {
 macro_rules! declare_words {
     (
         $(#[$attribute:meta])*
-        pub enum $name:ident {
+        $visibility:vis enum $name:ident {
             $( $(#[$case_attribute:meta])* $case:ident = $word:literal, )+
         }
     ) => {
         $(#[$attribute])*
         #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, $crate::serde::Serialize, $crate::serde::Deserialize)]
         #[serde(crate = "mackrl_env::serde")]
-        pub enum $name {
+        $visibility enum $name {
             $(
                 $(#[$case_attribute])*
                 #[serde(rename = $word)]
@@ -321,14 +321,14 @@ macro_rules! declare_words {
 
         impl $name {
             /// How the cases are written, in the order of declaration.
-            pub const WORDS: &'static [&'static str] = &[$($word),+];
+            $visibility const WORDS: &'static [&'static str] = &[$($word),+];
 
             /// What a setting of this type accepts.
-            pub const ACCEPTS: $crate::settings::Accepts = $crate::settings::Accepts::OneOf(Self::WORDS);
+            $visibility const ACCEPTS: $crate::settings::Accepts = $crate::settings::Accepts::OneOf(Self::WORDS);
 
             /// How this case is written.
             #[must_use]
-            pub const fn word(self) -> &'static str {
+            $visibility const fn word(self) -> &'static str {
                 match self {
                     $(Self::$case => $word,)+
                 }
@@ -443,7 +443,7 @@ mod tests {
 
     declare_words! {
         /// A pace.
-        pub enum Pace {
+        enum Pace {
             /// One foot before the other.
             #[default]
             Walk = "at-a-walk",
@@ -454,7 +454,7 @@ mod tests {
 
     declare_settings! {
         /// How one moves.
-        pub struct Moving {
+        struct Moving {
             /// The pace.
             pace: Pace = Pace::Walk, Pace::ACCEPTS;
             /// Metres of a step.
