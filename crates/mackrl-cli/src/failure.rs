@@ -9,7 +9,7 @@ use std::{
 
 use mackrl::{NotFinite, nn::UnknownInstructionSet};
 use mackrl_env::StepError;
-use mackrl_run::config::{Config, ConfigError};
+use mackrl_run::config::ConfigError;
 
 use crate::provenance::CODE;
 
@@ -319,16 +319,18 @@ fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
         ConfigError::Scenario { .. } => Some(
             "examples/scenarios/sniper-alley.toml explains every line of a scenario".to_owned(),
         ),
-        ConfigError::UnknownKey { .. } => Some(
+        ConfigError::UnknownKey { .. }
+        | ConfigError::RenamedKey { .. }
+        | ConfigError::ForeignKey { .. } => Some(
             "`mackrl config --print` lists every setting, `mackrl config --explain KEY` explains one".to_owned(),
         ),
         ConfigError::WrongValue { key, .. } => {
-            let settings = Config::settings();
+            let settings = crate::registry().settings();
             let setting = settings.iter().find(|setting| setting.key == *key)?;
             Some(format!("{key}: {}", setting.meaning))
         }
         ConfigError::Syntax { .. } => {
-            Some("settings are written as TOML, such as learner.gamma = 0.95".to_owned())
+            Some("settings are written as TOML, such as algorithm.gamma = 0.95".to_owned())
         }
         _ => None,
     }
@@ -346,13 +348,13 @@ fn reader_has_gone(error: &anyhow::Error) -> bool {
 #[cfg(test)]
 mod tests {
     use anyhow::Context;
-    use mackrl_run::config::ConfigBuilder;
+    use mackrl_run::config::Config;
 
     use super::*;
 
     #[test]
     fn every_kind_of_error_has_its_exit_code() {
-        let config = ConfigBuilder::new().set("a=1").unwrap_err();
+        let config = Config::with(&["a=1"]).unwrap_err();
         let missing = io::Error::from(io::ErrorKind::NotFound);
         let folder = PathBuf::from("x");
         let cases: [(anyhow::Error, Exit); 8] = [
@@ -388,12 +390,12 @@ mod tests {
 
     #[test]
     fn the_chain_of_causes_is_told_once_with_the_remedy() {
-        let error = Err::<(), _>(ConfigBuilder::new().set("gama=1").unwrap_err())
+        let error = Err::<(), _>(Config::with(&["gama=1"]).unwrap_err())
             .context("cannot configure")
             .unwrap_err();
         assert_eq!(
             explain(&error),
-            "error: cannot configure: --set gama=1: unknown key `gama`, did you mean `learner.gamma`?\n\
+            "error: cannot configure: --set gama=1: unknown key `gama`, did you mean `algorithm.gamma`?\n\
              hint: `mackrl config --print` lists every setting, `mackrl config --explain KEY` explains one\n"
         );
     }

@@ -23,12 +23,19 @@ mod signals;
 mod sweep;
 mod training_loop;
 
-use std::process::ExitCode;
+use std::{process::ExitCode, sync::OnceLock};
 
 use clap::Parser;
 use mackrl::nn::InstructionSet;
+use mackrl_run::config::Registry;
 
 use crate::args::{Cli, Command};
+
+/// The worlds and the algorithms that this program offers.
+fn registry() -> &'static Registry {
+    static REGISTRY: OnceLock<Registry> = OnceLock::new();
+    REGISTRY.get_or_init(Registry::built_in)
+}
 
 fn main() -> ExitCode {
     if let Err(error) = InstructionSet::chosen() {

@@ -130,7 +130,7 @@ impl Provenance {
         let provenance = Self {
             id: String::new(),
             code: CODE.to_owned(),
-            map: env.map.clone(),
+            map: env.map().to_owned(),
             map_sha256: sha256(env.data().as_bytes()),
             config_sha256: sha256(settings.as_bytes()),
             seeds,
@@ -212,9 +212,9 @@ mod tests {
     #[test]
     fn whatever_makes_another_experiment_is_named() {
         let one = provenance(|_| ());
-        let gamma = provenance(|config| config.learner.gamma = 0.5);
+        let gamma = provenance(|config| config.algorithm.set("gamma", 0.5).unwrap());
         assert_eq!(one.differences(&gamma), ["config"]);
-        let map = provenance(|config| config.env.map = "2s3z".to_owned());
+        let map = provenance(|config| config.env.set("map", "2s3z").unwrap());
         assert_eq!(one.differences(&map), ["map", "config"]);
         let tests = provenance(|config| config.test.episodes = 5);
         assert_eq!(one.differences(&tests), ["config", "evaluation"]);
@@ -229,7 +229,7 @@ mod tests {
     fn repetitions_are_merged_and_experiments_are_not() {
         let one = provenance(|_| ());
         let two = provenance(|config| config.run.seed = 2);
-        let gamma = provenance(|config| config.learner.gamma = 0.5);
+        let gamma = provenance(|config| config.algorithm.set("gamma", 0.5).unwrap());
         let merged = Provenance::merged([&one, &gamma, &two]);
         assert_eq!(merged.len(), 2);
         assert_eq!((&merged[0].seeds, &merged[1]), (&vec![1, 2], &gamma));
@@ -247,10 +247,10 @@ mod tests {
             .concat();
         assert_eq!(provenance(|_| ()).map_sha256, sha256(files.as_bytes()));
         let lotv = provenance(|config| {
-            config.env.settings.units = mackrl_skirmish::UnitData::Lotv;
+            config.env.set("units", "lotv").unwrap();
         });
         assert_ne!(lotv.map_sha256, provenance(|_| ()).map_sha256);
-        let game = provenance(|config| config.env.map = "matrix-game".to_owned());
+        let game = provenance(|config| *config = Config::with(&["env.name=matrix-game"]).unwrap());
         let payoffs = "1 0 0 0.4 0\n0 0.2 0.4 0.8 0.4\n0 0 0 0.4 0\n0 0 0 0.2 0\n0 0 0 0 0\n\
                        0 0 0.2 0 1\n0 0 0.4 0 0\n0.2 0.4 0.8 0.4 0.2\n0 0 0.4 0 0\n0 0 0.2 0 0\n";
         assert_eq!(game.map_sha256, sha256(payoffs.as_bytes()));

@@ -94,7 +94,7 @@ fn limited(command: &Command, blocks: u32) -> Command {
 #[test]
 fn a_disk_that_takes_no_more_stops_the_run_and_loses_nothing() {
     // Rows of metrics outgrow checkpoints.
-    let settings = ["policy.hidden=2", "run.metrics_interval_steps_env=1"];
+    let settings = ["algorithm.hidden=2", "run.metrics_interval_steps_env=1"];
     let parent = tempfile::tempdir().expect("a folder for the runs");
     let undisturbed = parent.path().join("undisturbed");
     exits(train(&undisturbed, &settings), 0);

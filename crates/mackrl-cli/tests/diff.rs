@@ -83,9 +83,9 @@ fn another_seed_is_named_with_the_first_step_that_it_changes() {
 fn another_rate_changes_what_is_learnt_before_what_is_played() {
     let parent = tempfile::tempdir().expect("a folder for runs");
     let one = run(parent.path(), "one", 1, &[]);
-    let other = run(parent.path(), "other", 1, &["learner.learning_rate=0.1"]);
+    let other = run(parent.path(), "other", 1, &["algorithm.learning_rate=0.1"]);
     let found = diff(&one, &other, 1);
-    assert_eq!(found["configuration"][0]["name"], "learner.learning_rate");
+    assert_eq!(found["configuration"][0]["name"], "algorithm.learning_rate");
     assert_eq!(found["replay"]["learning"]["update"], 0);
     let game = found["replay"]["game"]["update"].as_u64();
     assert!(game.is_some_and(|update| update >= 1), "{found}");

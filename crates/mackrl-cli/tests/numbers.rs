@@ -9,12 +9,12 @@ use support::{checkpoints, exits, mackrl, resume};
 
 /// Rewards of 10¹⁸ and a critic whose gradient is not shortened: after some updates its square is infinite.
 const HUGE: &[&str] = &[
-    "policy.hidden=8",
+    "algorithm.hidden=8",
     "env.reward_negative_scale=1e9",
     "env.reward_death_value=1e9",
     "env.reward_only_positive=false",
     "env.reward_scale=false",
-    "learner.gradient_norm_max=1e30",
+    "algorithm.gradient_norm_max=1e30",
     "run.steps_env=20000",
     "run.checkpoint_interval_steps_env=1",
     "test.episodes=2",

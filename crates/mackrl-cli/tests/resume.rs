@@ -16,7 +16,7 @@ use support::{
 };
 
 /// Settings with which one update takes seconds.
-const SLOW: &[&str] = &["policy.hidden=128", "learner.environments=128"];
+const SLOW: &[&str] = &["algorithm.hidden=128", "algorithm.environments=128"];
 
 fn send(signal: &str, child: &Child) {
     let sent = Command::new("kill")
@@ -87,7 +87,7 @@ fn a_second_interrupt_stops_at_once() {
 fn a_run_of_a_large_team_stops_in_time_and_goes_on() {
     let parent = tempfile::tempdir().expect("a folder for the run");
     let run = parent.path().join("run");
-    let large = ["env.map=27m_vs_30m", "policy.partitions=round-robin"];
+    let large = ["env.map=27m_vs_30m", "algorithm.partitions=round-robin"];
     let settings: Vec<&str> = SLOW.iter().copied().chain(large).collect();
     // Neither its first test nor its first batch is anywhere near its end.
     for mut command in [train(&run, &settings), resume(&run, 2)] {

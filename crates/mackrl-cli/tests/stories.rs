@@ -148,17 +148,17 @@ fn an_unknown_flag_is_a_usage_error() {
 
 #[test]
 fn an_unknown_setting_names_its_neighbour() {
-    insta::assert_snapshot!(type_in("config --set learner.gama=0.9").fails(64), @r"
-    error: --set learner.gama=0.9: unknown key `learner.gama`, did you mean `learner.gamma`?
+    insta::assert_snapshot!(type_in("config --set algorithm.gama=0.9").fails(64), @r"
+    error: --set algorithm.gama=0.9: unknown key `algorithm.gama`, did you mean `algorithm.gamma`?
     hint: `mackrl config --print` lists every setting, `mackrl config --explain KEY` explains one
     ");
 }
 
 #[test]
 fn a_value_out_of_range_says_what_is_expected() {
-    insta::assert_snapshot!(type_in("config --set learner.gamma=2").fails(64), @r"
-    error: --set learner.gamma=2: `learner.gamma` is 2.0, expected a number in [0, 1]
-    hint: learner.gamma: Discount γ of one environment step.
+    insta::assert_snapshot!(type_in("config --set algorithm.gamma=2").fails(64), @r"
+    error: --set algorithm.gamma=2: `algorithm.gamma` is 2.0, expected a number in [0, 1]
+    hint: algorithm.gamma: Discount γ of one environment step.
     ");
     insta::assert_snapshot!(type_in("config --algorithm qmix").fails(64), @r#"
     error: --algorithm qmix: `policy.algorithm` is "qmix", expected `mackrl` or `central-v`
@@ -178,8 +178,8 @@ fn an_error_in_a_file_names_file_line_and_column() {
     std::fs::write(folder.path().join("mine.toml"), text).expect("the folder can be written");
     let story = type_in_folder("config --config mine.toml", folder.path());
     insta::assert_snapshot!(story.fails(64), @r#"
-    error: mine.toml:3:17: `learner.learning_rate` is "fast", expected a number in (0, 1]
-    hint: learner.learning_rate: Step size of the controllers.
+    error: mine.toml:3:17: `algorithm.learning_rate` is "fast", expected a number in (0, 1]
+    hint: algorithm.learning_rate: Step size of the controllers.
     "#);
 }
 
@@ -211,22 +211,22 @@ fn the_printed_configuration_can_be_read_back() {
 
 #[test]
 fn a_setting_is_explained_with_its_value_everywhere() {
-    insta::assert_snapshot!(type_in("config --explain learner.lambda --set learner.lambda=0.5").succeeds(), @r#"
-    learner.lambda
+    insta::assert_snapshot!(type_in("config --explain algorithm.lambda --set algorithm.lambda=0.5").succeeds(), @r#"
+    algorithm.lambda
       λ of the critic's TD(λ) targets: 0 looks one step ahead, 1 to the end of the episode.
       takes              a number in [0, 1]
       built-in           0.8
       preset default     0.8  of the critic's TD(lambda) targets
       preset paper       0.8  "TD-lambda of 0.8"
       preset paper-code  0.8
-      here               0.5  --set learner.lambda=0.5
+      here               0.5  --set algorithm.lambda=0.5
     "#);
     let section = type_in("config --explain test --json").succeeds();
     let section: Vec<serde_json::Value> = serde_json::from_str(&section).expect("a JSON array");
     let keys: Vec<_> = section.iter().map(|setting| &setting["key"]).collect();
     assert_eq!(keys, ["test.interval_steps_env", "test.episodes"]);
     insta::assert_snapshot!(type_in("config --explain lambada").fails(64), @r"
-    error: --explain lambada: unknown key `lambada`, did you mean `learner.lambda`?
+    error: --explain lambada: unknown key `lambada`, did you mean `algorithm.lambda`?
     hint: `mackrl config --print` lists every setting, `mackrl config --explain KEY` explains one
     ");
     assert!(
@@ -329,7 +329,7 @@ fn a_map_is_shown_with_a_picture_and_the_matrix_game_without() {
     obs_size    5
     state_size  12
 
-    Settings: env.matrix_game.payoffs, .distribution and .common_knowledge; `mackrl reproduce figure5` is the paper's experiment.
+    Settings: env.payoffs, .distribution and .common_knowledge; `mackrl reproduce figure5` is the paper's experiment.
     ");
     insta::assert_snapshot!(type_in("maps 2m_vs_2z").fails(64), @r"
     error: maps 2m_vs_2z: unknown map `2m_vs_2z`, did you mean `2m_vs_1z`?

@@ -16,10 +16,10 @@ use support::{exits, mackrl, outcome, uninterrupted};
 /// The settings of the small run, as a plan has them.
 const SETTINGS: &str = "run.metrics_interval_steps_env = 200\n\
      run.checkpoint_interval_steps_env = 1\n\
-     policy.hidden = 8\n\
-     learner.environments = 1\n\
-     learner.target_interval_updates = 31\n\
-     exploration.steps_env = 1000\n\
+     algorithm.hidden = 8\n\
+     algorithm.environments = 1\n\
+     algorithm.target_interval_updates = 31\n\
+     algorithm.exploration_steps_env = 1000\n\
      test.interval_steps_env = 500\n\
      test.episodes = 2\n";
 
@@ -222,7 +222,7 @@ fn a_broken_plan_is_told_by_line_and_column() {
     .expect("a plan");
     let refusal = exits(sweep(&path, &[]), 64);
     assert!(
-        refusal.contains("plan.toml:4:16: unknown key `learner.gama`"),
+        refusal.contains("plan.toml:4:16: unknown key `algorithm.gama`"),
         "{refusal}"
     );
     fs::write(&path, [0xFF, 0xFE]).expect("a plan");

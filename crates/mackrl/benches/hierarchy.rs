@@ -13,7 +13,7 @@ use mackrl::{
 };
 use mackrl_env::{Action, Environment, EpisodeKey, Observations, Stream};
 use mackrl_run::{
-    config::ConfigBuilder,
+    config::Config,
     training::assembly::{self, World},
 };
 
@@ -86,11 +86,11 @@ struct Scene {
 
 impl Scene {
     fn on(map: &str) -> Self {
-        let config = ConfigBuilder::new()
-            .set(&format!("env.map={map}"))
-            .and_then(|builder| builder.set("policy.partitions=round-robin"))
-            .and_then(|builder| builder.build())
-            .expect("a map of this program");
+        let settings = [
+            &format!("env.map={map}"),
+            "algorithm.partitions=round-robin",
+        ];
+        let config = Config::with(&settings).expect("a map of this program");
         let world = World::new(&config).expect("a world of this program");
         let policy = assembly::policy(&config, &world).expect("a policy of this program");
         let environments = world.environments(ENVIRONMENTS);

@@ -1,27 +1,21 @@
 //! You will see a pair learn to earn more than a joint learner can: it acts jointly on common knowledge, and delegates without.
 #![expect(clippy::print_stdout, reason = "an example shows what it found")]
 
-use mackrl_run::{config::ConfigBuilder, training::Trainer};
+use mackrl_run::{config::Config, training::Trainer};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let settings = [
-        "env.map=matrix-game",
-        "env.matrix_game.common_knowledge=0.7",
-        "learner.environments=32",
-        "learner.learning_rate=0.001",
-        "learner.critic_learning_rate=0.005",
-        "exploration.start=0.9",
+    let config = Config::with(&[
+        "env.name=matrix-game",
+        "env.common_knowledge=0.7",
+        "algorithm.environments=32",
+        "algorithm.learning_rate=0.001",
+        "algorithm.critic_learning_rate=0.005",
+        "algorithm.exploration_start=0.9",
         "run.steps_env=40000",
         "run.metrics_interval_steps_env=1000000",
         "test.interval_steps_env=4000",
         "test.episodes=1000",
-    ];
-    let config = settings
-        .into_iter()
-        .try_fold(ConfigBuilder::new(), |builder, setting| {
-            builder.set(setting)
-        })?
-        .build()?;
+    ])?;
     println!(
         "In 7 of 10 games the matrix is common knowledge. A joint learner earns at most 0.85;"
     );

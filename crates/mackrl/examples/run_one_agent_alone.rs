@@ -4,12 +4,12 @@
 use mackrl::policy::{Behaviour, Recording, Situation};
 use mackrl_env::{Action, AgentId, EpisodeKey, Observations, Stream};
 use mackrl_run::{
-    config::ConfigBuilder,
+    config::Config,
     training::assembly::{self, World},
 };
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let config = ConfigBuilder::new().set("env.map=3m")?.build()?;
+    let config = Config::with(&["env.map=3m"])?;
     let world = World::new(&config)?;
     let policy = assembly::policy(&config, &world)?;
     let weights = policy.weights(&policy.initialise(1));

@@ -1,15 +1,15 @@
 //! You will see a team of three marines learn to beat three others, within a minute or so of games and seconds of yours.
 #![expect(clippy::print_stdout, reason = "an example shows what it found")]
 
-use mackrl_run::{config::ConfigBuilder, training::Trainer};
+use mackrl_run::{config::Config, training::Trainer};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let config = ConfigBuilder::new()
-        .set("env.map=3m")?
-        .set("run.steps_env=25000")?
-        .set("run.metrics_interval_steps_env=1000000")?
-        .set("test.interval_steps_env=5000")?
-        .build()?;
+    let config = Config::with(&[
+        "env.map=3m",
+        "run.steps_env=25000",
+        "run.metrics_interval_steps_env=1000000",
+        "test.interval_steps_env=5000",
+    ])?;
     let mut trainer = Trainer::new(&config, 2)?;
     println!(" steps   won   return   enemies defeated   pairs that know something and delegate");
     while !trainer.finished() {

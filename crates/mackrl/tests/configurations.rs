@@ -5,34 +5,34 @@ use std::ops::Bound::{self, Excluded, Included, Unbounded};
 use mackrl::Error;
 use mackrl_env::settings::Accepts;
 use mackrl_run::{
-    config::{Config, ConfigBuilder, ConfigError, Origin, presets},
+    config::{Config, ConfigBuilder, ConfigError, Registry, Setting},
     training::Trainer,
 };
 use proptest::prelude::*;
 
 /// Settings that decide how long a run takes, with the most that a test can wait for.
 const COSTLY: &[(&str, u64)] = &[
-    ("policy.hidden", 5),
-    ("learner.environments", 3),
+    ("algorithm.hidden", 5),
+    ("algorithm.environments", 3),
     ("test.episodes", 2),
     ("run.steps_env", 3),
 ];
 
 /// Settings whose values have to go with those of others.
 const COMBINED: &[&str] = &[
-    "exploration.start",
-    "exploration.finish",
+    "algorithm.exploration_start",
+    "algorithm.exploration_finish",
     "env.shoot_range",
     "env.sight_range",
-    "policy.partitions",
+    "algorithm.partitions",
 ];
 
 /// Values of settings that are words of another kind.
 fn words(key: &str) -> &'static [&'static str] {
     match key {
-        "env.map" => &["3m", "2s3z", "2m_vs_1z", "matrix-game"],
-        "env.scenario" | "env.game_version" => &[""],
-        "policy.partitions" => &["all", "round-robin", "sampled:1"],
+        "env.map" => &["3m", "2s3z", "2m_vs_1z"],
+        "env.scenario" => &[""],
+        "algorithm.partitions" => &["all", "round-robin", "sampled:1"],
         other => panic!("no values of {other} are known here"),
     }
 }
@@ -55,8 +55,6 @@ fn value(key: &str, accepts: Accepts) -> BoxedStrategy<String> {
                 .prop_map(move |value: f64| format!("{:?}", value.clamp(least, greatest)))
                 .boxed()
         }
-        // The other engine is a game that may not be installed.
-        Accepts::OneOf(_) if key == "env.engine" => Just(quoted(&"simulator")).boxed(),
         Accepts::OneOf(words) => prop::sample::select(words)
             .prop_map(move |word| quoted(&word))
             .boxed(),
@@ -76,10 +74,27 @@ fn inner(bound: Bound<f64>, direction: f64) -> f64 {
     }
 }
 
+/// Worlds and algorithms that need nothing but this program.
+const CHOICES: [[&str; 2]; 4] = [
+    ["env.name=skirmish", "algorithm.name=mackrl"],
+    ["env.name=skirmish", "algorithm.name=central-v"],
+    ["env.name=matrix-game", "algorithm.name=mackrl"],
+    ["env.name=matrix-game", "algorithm.name=central-v"],
+];
+
+/// The settings of a choice, its names aside.
+fn settings(choice: [&str; 2]) -> Vec<Setting> {
+    let config = Config::with(&choice).expect("names of built-in kinds");
+    let settings = config.settings().into_iter();
+    settings
+        .filter(|setting| !setting.key.ends_with(".name"))
+        .collect()
+}
+
 prop_compose! {
-    /// Any value for any setting, each set or left alone.
-    fn assignments()(
-        values in Config::settings()
+    /// Any value for any setting of this choice, each set or left alone.
+    fn assignments_of(choice: [&'static str; 2])(
+        values in settings(choice)
             .into_iter()
             .map(|setting| prop::option::of(value(&setting.key, setting.accepts).prop_map({
                 let key = setting.key.clone();
@@ -88,8 +103,13 @@ prop_compose! {
             .collect::<Vec<_>>(),
     ) -> Vec<String> {
         let short = COSTLY.iter().map(|(key, most)| format!("{key}={most}"));
-        short.chain(values.into_iter().flatten()).collect()
+        let choice = choice.map(str::to_owned).into_iter();
+        choice.chain(short).chain(values.into_iter().flatten()).collect()
     }
+}
+
+fn assignments() -> impl Strategy<Value = Vec<String>> {
+    prop::sample::select(&CHOICES[..]).prop_flat_map(assignments_of)
 }
 
 /// The configuration of these assignments, without those that do not go with others: the error says which.
@@ -97,10 +117,12 @@ fn configuration(mut assignments: Vec<String>) -> Result<Config, ConfigError> {
     loop {
         let layers = assignments
             .iter()
-            .try_fold(ConfigBuilder::new(), |builder, one| builder.set(one))?;
+            .try_fold(ConfigBuilder::new(&Registry::built_in()), |builder, one| {
+                builder.set(one)
+            })?;
         let key = match layers.build() {
             Err(ConfigError::WrongValue { key, .. })
-                if COMBINED.contains(&&*key) && layers.origin(&key) != Origin::BuiltIn =>
+                if COMBINED.contains(&&*key) && layers.written(&key).is_some() =>
             {
                 key
             }
@@ -133,7 +155,7 @@ proptest! {
 
     #[test]
     fn no_spoilt_preset_makes_reading_panic(
-        preset in prop::sample::select(presets()),
+        preset in prop::sample::select(Registry::built_in().presets().collect::<Vec<_>>()),
         spoils in prop::collection::vec((any::<prop::sample::Index>(), any::<prop::sample::Index>(), 0..4_u8), 1..5),
     ) {
         let mut text: Vec<char> = preset.text.chars().collect();
@@ -148,7 +170,7 @@ proptest! {
             if text.is_empty() { break; }
         }
         let text: String = text.into_iter().collect();
-        if let Ok(builder) = ConfigBuilder::new().file("spoilt.toml", &text) {
+        if let Ok(builder) = ConfigBuilder::new(&Registry::built_in()).file("spoilt.toml", &text) {
             let _ = builder.build();
         }
     }

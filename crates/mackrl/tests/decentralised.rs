@@ -5,7 +5,7 @@ use std::fmt::Debug;
 use mackrl::{NotFinite, Stopwatch, decentralised::*, nn::ParameterLayout, policy::*};
 use mackrl_env::*;
 use mackrl_run::{
-    config::{Config, ConfigBuilder},
+    config::Config,
     training::assembly::{self, World},
 };
 
@@ -70,12 +70,7 @@ impl Actor for PeekingActor {
 }
 
 fn config(settings: &[&str]) -> Config {
-    let builder = settings
-        .iter()
-        .fold(ConfigBuilder::new(), |builder, setting| {
-            builder.set(setting).unwrap()
-        });
-    builder.build().unwrap()
+    Config::with(settings).unwrap()
 }
 
 /// Certifies an untrained team; `disguise` may change the policy of the central run.
@@ -118,7 +113,7 @@ fn certify_honest(settings: &[&str], episodes: usize) -> Certificate {
 fn agents_on_their_own_play_the_central_run_on_every_map() {
     for map in mackrl_skirmish::map_names() {
         let map = format!("env.map={map}");
-        let certificate = certify_honest(&[&map, "policy.partitions=round-robin"], 1);
+        let certificate = certify_honest(&[&map, "algorithm.partitions=round-robin"], 1);
         assert_eq!(certificate.first_mismatch, None, "{map}");
         assert!(
             certificate.actions_compared > 0 && certificate.inputs_compared > 0,
@@ -132,10 +127,10 @@ fn agents_on_their_own_play_the_central_run_on_every_map() {
 fn every_variant_of_the_hierarchy_is_decentralised() {
     let variants: [&[&str]; 5] = [
         &["env.map=2s3z"],
-        &["env.map=2s3z", "policy.common_knowledge=thin"],
-        &["env.map=2s3z", "policy.partitions=sampled:3"],
-        &["env.map=2s3z", "policy.selector=uniform"],
-        &["env.map=2s3z", "policy.algorithm=central-v"],
+        &["env.map=2s3z", "algorithm.common_knowledge=thin"],
+        &["env.map=2s3z", "algorithm.partitions=sampled:3"],
+        &["env.map=2s3z", "algorithm.selector=uniform"],
+        &["env.map=2s3z", "algorithm.name=central-v"],
     ];
     for variant in variants {
         let certificate = certify_honest(variant, 3);

@@ -11,7 +11,7 @@ use mackrl_run::{
     config::Config,
     training::{Evaluation, Trainer, evaluate},
 };
-use support::team::{Team, config, keys};
+use support::team::{Team, config, keys, world_setting};
 
 /// What a run leaves behind: its metrics as JSON without `sys/`, its weights, and how they play.
 #[derive(PartialEq)]
@@ -26,7 +26,7 @@ fn short_run(algorithm: &str, seed: &str) -> Config {
         "env.map=3m",
         algorithm,
         seed,
-        "policy.hidden=16",
+        "algorithm.hidden=16",
         "run.steps_env=3000",
         "run.metrics_interval_steps_env=700",
         "test.interval_steps_env=1500",
@@ -63,7 +63,7 @@ fn assert_same_run(found: &Outcome, expected: &Outcome, what: &str) {
 
 #[test]
 fn a_run_gives_the_same_bytes_twice_and_on_any_number_of_threads() {
-    for algorithm in ["policy.algorithm=mackrl", "policy.algorithm=central-v"] {
+    for algorithm in ["algorithm.name=mackrl", "algorithm.name=central-v"] {
         let config = short_run(algorithm, "run.seed=1");
         let once = train(&config, 1);
         assert!(once.metrics.len() >= 5, "rows of training and of tests");
@@ -77,7 +77,7 @@ fn a_run_gives_the_same_bytes_twice_and_on_any_number_of_threads() {
 #[test]
 fn another_seed_gives_another_run() {
     let [first, second] = ["run.seed=1", "run.seed=2"]
-        .map(|seed| train(&short_run("policy.algorithm=mackrl", seed), 1));
+        .map(|seed| train(&short_run("algorithm.name=mackrl", seed), 1));
     assert!(first.metrics != second.metrics, "the same metrics");
     assert!(first.weights != second.weights, "the same weights");
 }
@@ -105,9 +105,9 @@ fn an_episode_is_a_function_of_its_key_whoever_is_played_beside_it() {
         ("2s3z", "round-robin"),
         ("matrix-game", "all"),
     ] {
-        let map = format!("env.map={map}");
-        let partitions = format!("policy.partitions={partitions}");
-        let team = Team::new(&[&map, &partitions, "policy.hidden=13"]);
+        let map = world_setting(map);
+        let partitions = format!("algorithm.partitions={partitions}");
+        let team = Team::new(&[&map, &partitions, "algorithm.hidden=13"]);
         for behaviour in [Behaviour::sampled(0.3), Behaviour::GREEDY] {
             let alone: Vec<Episode> = (keys.iter())
                 .flat_map(|&key| play(&team, &[key], 1, behaviour))

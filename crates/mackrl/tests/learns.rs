@@ -49,7 +49,7 @@ fn a_team_learns_to_win_three_marines_against_three() {
 #[test]
 #[ignore = "minutes"]
 fn every_seed_and_both_algorithms_learn_to_win_three_marines_against_three() {
-    for algorithm in ["policy.algorithm=mackrl", "policy.algorithm=central-v"] {
+    for algorithm in ["algorithm.name=mackrl", "algorithm.name=central-v"] {
         for seed in ["run.seed=1", "run.seed=2", "run.seed=3"] {
             let settings = ["env.map=3m", "env.spawn_scatter=0", "run.steps_env=300000"];
             let config = config(&[&settings[..], &[algorithm, seed]].concat());
@@ -81,12 +81,12 @@ fn networks_play_the_matrix_game_better_than_both_tabular_baselines() {
         .map(|learner| baselines.curve(learner, |run| run.test).mean[0]);
     for seed in ["run.seed=1", "run.seed=2", "run.seed=3"] {
         let config = config(&[
-            "env.map=matrix-game",
-            &format!("env.matrix_game.common_knowledge={point}"),
-            "learner.environments=32",
-            "learner.learning_rate=0.001",
-            "learner.critic_learning_rate=0.005",
-            "exploration.start=0.9",
+            "env.name=matrix-game",
+            &format!("env.common_knowledge={point}"),
+            "algorithm.environments=32",
+            "algorithm.learning_rate=0.001",
+            "algorithm.critic_learning_rate=0.005",
+            "algorithm.exploration_start=0.9",
             "run.steps_env=40000",
             "test.interval_steps_env=40000",
             seed,

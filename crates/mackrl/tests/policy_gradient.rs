@@ -19,7 +19,7 @@ struct Subject {
 
 impl Subject {
     fn new(settings: &[&str], episodes: u64) -> Self {
-        let team = Team::new(&[settings, &["policy.hidden=5"]].concat());
+        let team = Team::new(&[settings, &["algorithm.hidden=5"]].concat());
         let parameters = team.policy.initialise(3);
         let played = team.learnable(&parameters, &keys(episodes));
         Self {
@@ -118,7 +118,10 @@ fn the_gradient_of_whole_episodes_is_that_of_their_log_probability() {
 
 #[test]
 fn the_gradient_is_right_where_few_pairs_are_asked_and_where_nobody_selects() {
-    for setting in ["policy.partitions=round-robin", "policy.selector=uniform"] {
+    for setting in [
+        "algorithm.partitions=round-robin",
+        "algorithm.selector=uniform",
+    ] {
         let subject = check(&["env.map=3m", setting], 3, 1e-3);
         assert!(subject.team.places("pair_selector").is_empty(), "{setting}");
     }
@@ -126,5 +129,5 @@ fn the_gradient_is_right_where_few_pairs_are_asked_and_where_nobody_selects() {
 
 #[test]
 fn the_gradient_of_many_short_episodes_is_that_of_their_log_probability() {
-    check(&["env.map=matrix-game"], 61, 1e-2);
+    check(&["env.name=matrix-game"], 61, 1e-2);
 }

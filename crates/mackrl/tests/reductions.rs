@@ -10,7 +10,7 @@ use mackrl::{
 use mackrl_env::{EpisodeKey, Stream};
 use support::{
     MASKED, Tables, assert_close,
-    team::{Team, keys, norm},
+    team::{Team, keys, norm, world_setting},
 };
 
 /// `Σ_a log π_a(u_a)`, in the order in which a partition names the agents.
@@ -180,9 +180,9 @@ fn single_precision_gives_the_same_numbers_with_fewer_digits() {
 
 /// A hierarchy and a Central-V team with the same agent controllers, and their parameters.
 fn hierarchy_and_central_v(settings: &[&str], delegation: &str) -> [(Team, Vec<f32>); 2] {
-    let mackrl = Team::new(&[settings, &["policy.hidden=11", delegation]].concat());
-    let algorithm = "policy.algorithm=central-v";
-    let central = Team::new(&[settings, &["policy.hidden=11", algorithm]].concat());
+    let mackrl = Team::new(&[settings, &["algorithm.hidden=11", delegation]].concat());
+    let algorithm = "algorithm.name=central-v";
+    let central = Team::new(&[settings, &["algorithm.hidden=11", algorithm]].concat());
     let parameters = mackrl.policy.initialise(3);
     let agents = mackrl.places("agent_controller");
     let own = agents.iter().map(|&place| parameters[place]).collect();
@@ -192,9 +192,9 @@ fn hierarchy_and_central_v(settings: &[&str], delegation: &str) -> [(Team, Vec<f
 #[test]
 fn the_hierarchy_that_always_delegates_is_central_v() {
     for map in ["3m", "2s3z", "matrix-game"] {
-        let map = format!("env.map={map}");
+        let map = world_setting(map);
         let [(mackrl, parameters), (central, own)] =
-            hierarchy_and_central_v(&[&map], "policy.delegation=always");
+            hierarchy_and_central_v(&[&map], "algorithm.delegation=always");
         let found = mackrl.learnable(&parameters, &keys(5));
         let expected = central.learnable(&own, &keys(5));
         assert_eq!(found.episodes, expected.episodes, "{map}");
@@ -218,10 +218,10 @@ fn the_hierarchy_that_always_delegates_is_central_v() {
 #[test]
 fn never_delegating_two_who_see_each_other_is_a_joint_learner() {
     let team = Team::new(&[
-        "env.map=matrix-game",
-        "env.matrix_game.common_knowledge=1.0",
-        "policy.delegation=never",
-        "policy.hidden=7",
+        "env.name=matrix-game",
+        "env.common_knowledge=1.0",
+        "algorithm.delegation=never",
+        "algorithm.hidden=7",
     ]);
     assert!(team.places("pair_selector").is_empty(), "one partition");
     let agents = team.places("agent_controller");
@@ -242,12 +242,9 @@ fn never_delegating_two_who_see_each_other_is_a_joint_learner() {
 
 #[test]
 fn never_delegating_without_common_knowledge_is_central_v() {
-    let settings = [
-        "env.map=matrix-game",
-        "env.matrix_game.common_knowledge=0.0",
-    ];
+    let settings = ["env.name=matrix-game", "env.common_knowledge=0.0"];
     let [(mackrl, parameters), (central, own)] =
-        hierarchy_and_central_v(&settings, "policy.delegation=never");
+        hierarchy_and_central_v(&settings, "algorithm.delegation=never");
     let found = mackrl.learnable(&parameters, &keys(13));
     let expected = central.learnable(&own, &keys(13));
     assert_eq!(found.episodes, expected.episodes);
@@ -258,11 +255,11 @@ fn never_delegating_without_common_knowledge_is_central_v() {
 #[test]
 fn two_agents_have_one_partition_whatever_the_schedule() {
     let play = |partitions: &str| {
-        let team = Team::new(&["env.map=matrix-game", "policy.hidden=7", partitions]);
+        let team = Team::new(&["env.name=matrix-game", "algorithm.hidden=7", partitions]);
         let played = team.learnable(&team.policy.initialise(3), &keys(11));
         (played.episodes, played.objective, played.gradient)
     };
-    let all = play("policy.partitions=all");
-    assert_eq!(all, play("policy.partitions=round-robin"));
-    assert_eq!(all, play("policy.partitions=sampled:1"));
+    let all = play("algorithm.partitions=all");
+    assert_eq!(all, play("algorithm.partitions=round-robin"));
+    assert_eq!(all, play("algorithm.partitions=sampled:1"));
 }

@@ -17,9 +17,7 @@ use mackrl_run::{
 
 /// Plays some episodes of the matrix game in 5 environments, 2 to a shard; gives the number of episodes of each shard.
 fn play(episodes: u64) -> Vec<usize> {
-    let mut config = Config::default();
-    config.env.map = "matrix-game".to_owned();
-    config.policy.hidden = 3;
+    let config = Config::with(&["env.name=matrix-game", "algorithm.hidden=3"]).unwrap();
     let world = World::new(&config).unwrap();
     let policy = assembly::policy(&config, &world).unwrap();
     let weights = policy.weights(&policy.initialise(1));
@@ -104,8 +102,7 @@ impl Environment for BrokenWorld {
 
 #[test]
 fn whatever_a_world_gives_that_is_not_finite_is_named_at_once() {
-    let mut config = Config::default();
-    config.policy.hidden = 3;
+    let config = Config::with(&["algorithm.hidden=3"]).unwrap();
     let world = World::new(&config).unwrap();
     assert_eq!(world.spec().observation_size, 30);
     let policy = assembly::policy(&config, &world).unwrap();

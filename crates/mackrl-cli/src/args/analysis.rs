@@ -15,7 +15,7 @@ use crate::recorded::{Axis, Selection};
 ///
 /// Each run's curve goes straight from test to test; the average is taken where tests are due, up to where the shortest run ends.
 ///
-/// Examples: mackrl plot runs/sweep -o curves.svg; mackrl plot runs/ablations -o iqm.png --statistic iqm --by policy.delegation
+/// Examples: mackrl plot runs/sweep -o curves.svg; mackrl plot runs/ablations -o iqm.png --statistic iqm --by algorithm.delegation
 #[derive(Debug, Args)]
 pub(crate) struct PlotArgs {
     #[command(flatten)]
@@ -109,7 +109,7 @@ pub(crate) struct RunsArgs {
     #[arg(long, value_name = "MAP", help_heading = "Selection")]
     map: Option<String>,
 
-    /// Tell runs apart by this setting too, such as policy.delegation; repeatable
+    /// Tell runs apart by this setting too, such as algorithm.delegation; repeatable
     #[arg(long, value_name = "KEY", help_heading = "Selection")]
     by: Vec<String>,
 

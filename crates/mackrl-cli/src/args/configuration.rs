@@ -2,9 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
 use clap::Args;
-use mackrl_run::config::{ConfigBuilder, ConfigError, EnvironmentConfig};
+use mackrl_run::config::{ConfigBuilder, ConfigError, EnvironmentConfig, Preset};
 use mackrl_skirmish::custom::LENGTH_MAX;
 
 use crate::bounded;
@@ -20,8 +19,7 @@ pub(crate) fn world(
     map: &str,
     set: &[String],
 ) -> anyhow::Result<EnvironmentConfig> {
-    let quoted = serde_json::to_string(map).context("a name is a string")?;
-    let mut builder = builder.flag(typed, &format!("env.map={quoted}"))?;
+    let mut builder = builder.map(typed, map);
     for assignment in set {
         builder = builder.set(assignment)?;
     }
@@ -56,18 +54,52 @@ pub(crate) fn read_scenario(path: &Path) -> anyhow::Result<String> {
     })
 }
 
+fn env_help() -> String {
+    let names = crate::registry()
+        .worlds()
+        .map(|kind| kind.name().to_owned());
+    format!(
+        "Kind of world: {} (short for `--set env.name=NAME`)",
+        or(names.collect())
+    )
+}
+
+fn algorithm_help() -> String {
+    let names = crate::registry().algorithms();
+    let names = names.map(|kind| kind.name().to_owned());
+    format!(
+        "What learns: {} (short for `--set algorithm.name=NAME`)",
+        or(names.collect())
+    )
+}
+
+fn preset_help() -> String {
+    let names = crate::registry().presets();
+    let names = names.map(|Preset { name, .. }| name.to_owned());
+    format!(
+        "Shipped configuration to start from: {}",
+        or(names.collect())
+    )
+}
+
+/// "a, b or c"
+fn or(names: Vec<String>) -> String {
+    match names.split_last() {
+        Some((last, others)) if !others.is_empty() => format!("{} or {last}", others.join(", ")),
+        _ => names.concat(),
+    }
+}
+
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ConfigurationArgs {
-    /// Map to play, as `mackrl maps` lists it, or a scenario file ending in .toml (short for `--set env.map=MAP`)
+    /// Map to play, as `mackrl maps` lists it, a scenario file ending in .toml, or a kind of world that has no maps
     #[arg(long, value_name = "MAP", help_heading = "Configuration")]
     pub(crate) map: Option<String>,
 
-    /// What plays the battles: simulator, or sc2 for StarCraft II on this machine (short for `--set env.engine=NAME`)
-    #[arg(long, value_name = "NAME", help_heading = "Configuration")]
+    #[arg(long, value_name = "NAME", help_heading = "Configuration", help = env_help())]
     pub(crate) env: Option<String>,
 
-    /// What learns: mackrl or central-v (short for `--set policy.algorithm=NAME`)
-    #[arg(long, value_name = "NAME", help_heading = "Configuration")]
+    #[arg(long, value_name = "NAME", help_heading = "Configuration", help = algorithm_help())]
     pub(crate) algorithm: Option<String>,
 
     /// Environment steps of training, summed over parallel environments (short for `--set run.steps_env=N`)
@@ -78,12 +110,12 @@ pub(crate) struct ConfigurationArgs {
     #[arg(long, value_name = "S", help_heading = "Configuration")]
     pub(crate) seed: Option<u64>,
 
-    /// Shipped configuration to start from: default, paper or paper-code
     #[arg(
         long,
         value_name = "NAME",
         default_value = "default",
-        help_heading = "Configuration"
+        help_heading = "Configuration",
+        help = preset_help()
     )]
     pub(crate) preset: String,
 
@@ -91,7 +123,7 @@ pub(crate) struct ConfigurationArgs {
     #[arg(long, value_name = "FILE", help_heading = "Configuration")]
     pub(crate) config: Option<PathBuf>,
 
-    /// One setting laid over everything else, such as learner.gamma=0.95; repeatable
+    /// One setting laid over everything else, such as algorithm.gamma=0.95; repeatable
     #[arg(long, value_name = "KEY=VALUE", help_heading = "Configuration")]
     pub(crate) set: Vec<String>,
 }
@@ -99,7 +131,7 @@ pub(crate) struct ConfigurationArgs {
 impl ConfigurationArgs {
     /// Lays the layers over each other; `build` on the result checks ranges and gives the configuration.
     pub(crate) fn layers(&self) -> anyhow::Result<ConfigBuilder> {
-        let mut builder = ConfigBuilder::new().preset(&self.preset)?;
+        let mut builder = ConfigBuilder::new(crate::registry()).preset(&self.preset)?;
         if let Some(path) = &self.config {
             let name = path.display().to_string();
             let text = bounded::read_text(path, FILE_MAX)?;
@@ -110,17 +142,19 @@ impl ConfigurationArgs {
                 builder = builder.flag(&format!("{flag} {value}"), &format!("{key}={value}"))?;
             }
         }
+        if let Some(map) = &self.map {
+            builder = builder.map(&format!("--map {map}"), map);
+        }
         for assignment in &self.set {
             builder = builder.set(assignment)?;
         }
         with_scenario(builder)
     }
 
-    fn short_flags(&self) -> [(&'static str, &'static str, Option<String>); 5] {
+    fn short_flags(&self) -> [(&'static str, &'static str, Option<String>); 4] {
         [
-            ("--map", "env.map", self.map.clone()),
-            ("--env", "env.engine", self.env.clone()),
-            ("--algorithm", "policy.algorithm", self.algorithm.clone()),
+            ("--env", "env.name", self.env.clone()),
+            ("--algorithm", "algorithm.name", self.algorithm.clone()),
             (
                 "--steps",
                 "run.steps_env",

@@ -140,7 +140,7 @@ pub(crate) struct MapsArgs {
 /// Later layers win: built-in values, --preset, --config, the short flags (--map, ...), --set. The output is a complete
 /// configuration file.
 ///
-/// Examples: mackrl config --print --preset paper --set learner.gamma=0.95 > mine.toml; mackrl config --explain learner.gamma;
+/// Examples: mackrl config --print --preset paper --set algorithm.gamma=0.95 > mine.toml; mackrl config --explain algorithm.gamma;
 /// mackrl config --explain run; mackrl config --schema > mackrl.schema.json
 #[derive(Debug, Args)]
 pub(crate) struct ConfigArgs {

@@ -32,8 +32,8 @@ pub(crate) struct PlayArgs {
     #[arg(long, value_name = "MAP", default_value = "3m")]
     pub(crate) map: String,
 
-    /// What plays the battles: simulator, or sc2 for StarCraft II on this machine, whose own replay --save-replay writes
-    #[arg(long, value_name = "NAME", default_value = "simulator")]
+    /// What plays the battles: skirmish, the built-in simulator, or sc2 for StarCraft II on this machine, whose own replay --save-replay writes
+    #[arg(long, value_name = "NAME", default_value = "skirmish")]
     pub(crate) env: String,
 
     /// How the team plays

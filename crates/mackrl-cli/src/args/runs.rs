@@ -170,16 +170,13 @@ mod tests {
     #[test]
     fn flags_of_training_reach_the_configuration() {
         let args: TrainArgs = typed(
-            "train --map 2s3z --algorithm central-v --preset paper --steps 9 --seed 4 --threads 3 --out x --set learner.gamma=0.5",
+            "train --map 2s3z --algorithm central-v --preset paper --steps 9 --seed 4 --threads 3 --out x --set algorithm.gamma=0.5",
         );
         let config = args.configuration.layers().unwrap().build().unwrap();
-        assert_eq!(config.env.map, "2s3z");
-        assert_eq!(
-            config.policy.algorithm,
-            mackrl_run::config::Algorithm::CentralV
-        );
+        assert_eq!(config.env.map(), "2s3z");
+        assert_eq!(config.algorithm.name(), "central-v");
         assert_eq!((config.run.steps_env, config.run.seed), (9, 4));
-        assert_eq!(config.learner.gamma, 0.5);
+        assert_eq!(config.get("algorithm.gamma"), Some(0.5.into()));
         assert_eq!(args.threads.count(), 3);
         assert_eq!(args.out, Some(PathBuf::from("x")));
     }

@@ -9,7 +9,6 @@ use anyhow::Context;
 use mackrl::policy::Behaviour;
 use mackrl_env::{EpisodeKey, Stream};
 use mackrl_run::{
-    config::Engine,
     replay::record_policy,
     training::{Episodes, Evaluation, evaluate_in},
 };
@@ -38,7 +37,7 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
         );
         return Err(Failure::Usage { message }.into());
     }
-    if args.save_replays > 0 && run.config.env.engine == Engine::Sc2 {
+    if args.save_replays > 0 && run.config.env.is_star_craft() {
         let message = "--save-replays plays episodes again in the simulator, but this run is one of StarCraft II";
         return Err(Failure::Usage {
             message: message.to_owned(),

@@ -34,13 +34,14 @@ pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<()> {
 
 /// Where a run lies if nothing else is asked for.
 fn default_folder(config: &Config) -> PathBuf {
-    let algorithm = config
-        .get("policy.algorithm")
-        .and_then(|name| name.as_str().map(str::to_owned))
-        .unwrap_or_default();
-    let Config { env, run, .. } = config;
-    let map = Path::new(&env.map).file_stem().unwrap_or_default();
-    let name = format!("{}-{algorithm}-seed{}", map.display(), run.seed);
+    let Config {
+        env,
+        algorithm,
+        run,
+        ..
+    } = config;
+    let map = Path::new(env.map()).file_stem().unwrap_or_default();
+    let name = format!("{}-{}-seed{}", map.display(), algorithm.name(), run.seed);
     Path::new("runs").join(name)
 }
 

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use mackrl::Error;
-use mackrl_env::{Environment, EpisodeKey};
+use mackrl_env::{EpisodeKey, World};
 use mackrl_run::{
-    config::{Config, Engine, EnvironmentConfig},
-    training::assembly::{Simulator, World, WorldSource},
+    config::{Config, EnvironmentConfig},
+    training::assembly,
 };
 use mackrl_skirmish::scripted::ScriptedPolicy;
 
@@ -18,38 +18,17 @@ use crate::{
 /// What is missing, and where it is not.
 const MISSING: &str = "this program was built without StarCraft II: build it on Linux with the feature `sc2`, which is on by default";
 
-/// Worlds of StarCraft II, none of which can be made.
-#[derive(Debug)]
-struct NoWorlds;
-
-impl WorldSource for NoWorlds {
-    fn make(&self, _: &EnvironmentConfig) -> Result<Box<dyn Environment>, Error> {
-        Err(missing())
-    }
-
-    fn parallel_max(&self) -> Option<usize> {
-        None
-    }
-
-    fn counts(&self) -> Vec<(&'static str, u64)> {
-        Vec::new()
-    }
+/// The world that a run is played in.
+pub(crate) fn world(config: &Config) -> Result<assembly::World, Error> {
+    assembly::World::of(world_of(&config.env)?)
 }
 
-/// The worlds that a run is played in.
-pub(crate) fn world(config: &Config) -> Result<World, Error> {
-    match config.env.engine {
-        Engine::Simulator => World::from_source(config, Arc::new(Simulator)),
-        Engine::Sc2 => Err(missing()),
+/// The world that `map` describes.
+pub(crate) fn world_of(map: &EnvironmentConfig) -> Result<Arc<dyn World>, Error> {
+    if map.is_star_craft() {
+        return Err(missing());
     }
-}
-
-/// Where the worlds that `map` describes come from.
-pub(crate) fn worlds(map: &EnvironmentConfig) -> Box<dyn WorldSource> {
-    match map.engine {
-        Engine::Simulator => Box::new(Simulator),
-        Engine::Sc2 => Box::new(NoWorlds),
-    }
+    map.world()
 }
 
 /// Plays nothing.
@@ -76,7 +55,5 @@ pub(crate) fn run(args: &Sc2Args) -> anyhow::Result<()> {
 }
 
 fn missing() -> Error {
-    Error::Config(format!(
-        "env.engine is `sc2`, expected `simulator`: {MISSING}"
-    ))
+    Error::Config(format!("env.name is `sc2`, expected `skirmish`: {MISSING}"))
 }

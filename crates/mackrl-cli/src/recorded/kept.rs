@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use mackrl_run::config::{Config, ConfigBuilder, ConfigError};
+use mackrl_run::config::{Config, ConfigBuilder, ConfigError, Registry};
 use serde::{Deserialize, Serialize};
 
 use super::{Measurements, RecordedRun};
@@ -65,7 +65,9 @@ impl TrainingRun {
     /// # Errors
     /// If this program does not understand it.
     pub(crate) fn config(&self) -> Result<Config, ConfigError> {
-        ConfigBuilder::new().file("config", &self.config)?.build()
+        ConfigBuilder::new(&Registry::built_in())
+            .recorded("config", &self.config)?
+            .build()
     }
 
     /// One of the metrics that are kept, at the environment steps at which tests were due; seconds are not kept.

@@ -80,7 +80,7 @@ impl RecordedRun {
 
     /// Name of what learns, as configurations have it.
     pub(crate) fn algorithm(&self) -> String {
-        setting(&self.config, "policy.algorithm")
+        self.config.algorithm.name().to_owned()
     }
 }
 

@@ -2,20 +2,21 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use mackrl_run::config::{Config, ConfigBuilder};
+use mackrl_run::config::{Origin, Registry};
 
 use super::{RecordedRun, setting};
 use crate::{failure::Failure, provenance::Provenance, run_folder::Status};
 
 /// Settings in which runs may differ and still be compared.
-const FREE: [&str; 5] = [
-    "policy.algorithm",
+const FREE: [&str; 6] = [
+    "algorithm.name",
     "run.seed",
     // These two change no result.
     "run.checkpoint_interval_steps_env",
     "run.checkpoints_kept",
     // Maps are never compared with each other.
     "env.map",
+    "env.name",
 ];
 
 /// Which runs are used, and how strictly.
@@ -85,12 +86,15 @@ pub(crate) fn group(runs: Vec<RecordedRun>, selection: &Selection) -> anyhow::Re
         check_key(key)?;
     }
     let found = runs.len();
-    let maps: BTreeSet<String> = runs.iter().map(|run| run.config.env.map.clone()).collect();
+    let maps: BTreeSet<String> = runs
+        .iter()
+        .map(|run| run.config.env.map().to_owned())
+        .collect();
     let here = |run: &RecordedRun| {
         selection
             .map
             .as_ref()
-            .is_none_or(|map| run.config.env.map == *map)
+            .is_none_or(|map| run.config.env.map() == *map)
     };
     let runs: Vec<RecordedRun> = runs.into_iter().filter(here).collect();
     if let (true, Some(map)) = (runs.is_empty(), &selection.map) {
@@ -124,7 +128,7 @@ fn series(runs: Vec<RecordedRun>, selection: &Selection) -> Vec<Series> {
     for run in runs {
         let algorithm = run.algorithm();
         let key = (
-            run.config.env.map.clone(),
+            run.config.env.map().to_owned(),
             usize::from(algorithm != "mackrl"),
             name(&run, selection),
         );
@@ -156,12 +160,12 @@ fn display_name(algorithm: &str) -> String {
 
 /// Refuses a key that no setting has.
 fn check_key(key: &str) -> anyhow::Result<()> {
-    if Config::keys().any(|known| known == key) {
+    let text = format!("--by {key}");
+    let found = Registry::built_in().settings_called(key, Origin::CommandLine { text })?;
+    if found.iter().any(|setting| setting.key == key) {
         return Ok(());
     }
-    // The library knows the nearest name, and its error says it.
-    ConfigBuilder::new().flag(&format!("--by {key}"), &format!("{key}=0"))?;
-    let message = format!("--by {key}: expected one setting, such as policy.delegation");
+    let message = format!("--by {key}: expected one setting, such as algorithm.delegation");
     Err(Failure::Usage { message }.into())
 }
 
@@ -169,7 +173,7 @@ fn check_alike(runs: &[RecordedRun], selection: &Selection) -> anyhow::Result<()
     let mut references: BTreeMap<&str, &RecordedRun> = BTreeMap::new();
     let mut seeds: BTreeMap<(&str, String, u64), &RecordedRun> = BTreeMap::new();
     for run in runs {
-        let reference = *references.entry(&run.config.env.map).or_insert(run);
+        let reference = *references.entry(run.config.env.map()).or_insert(run);
         if let Some((key, values)) = difference(reference, run, selection) {
             return Err(unlike(reference, run, &key, &values));
         }
@@ -184,7 +188,7 @@ fn check_alike(runs: &[RecordedRun], selection: &Selection) -> anyhow::Result<()
             }
         }
         let identity = (
-            &*run.config.env.map,
+            run.config.env.map(),
             name(run, selection),
             run.config.run.seed,
         );
@@ -222,10 +226,14 @@ fn difference(
     selection: &Selection,
 ) -> Option<(String, [String; 2])> {
     let free = |key: &str| FREE.contains(&key) || selection.by.iter().any(|by| by == key);
-    Config::keys().filter(|key| !free(key)).find_map(|key| {
+    // What another algorithm has no setting for is a difference between algorithms.
+    let shared = |key: &str| other.config.get(key).is_some();
+    let keys = one.config.keys().filter(|key| !free(key) && shared(key));
+    keys.map(|key| {
         let values = [one, other].map(|run| setting(&run.config, &key));
-        (values[0] != values[1]).then_some((key, values))
+        (key, values)
     })
+    .find(|(_, values)| values[0] != values[1])
 }
 
 fn unlike(
@@ -256,13 +264,12 @@ fn unlike(
 mod tests {
     use std::path::PathBuf;
 
+    use mackrl_run::config::Config;
+
     use super::*;
 
     fn run(settings: &[&str]) -> RecordedRun {
-        let builder = (settings.iter()).try_fold(ConfigBuilder::new(), |builder, setting| {
-            builder.set(setting)
-        });
-        let config = builder.unwrap().build().unwrap();
+        let config = Config::with(settings).unwrap();
         RecordedRun {
             path: PathBuf::from(settings.join(" ")),
             provenance: vec![Provenance::of_run(&config)],
@@ -286,7 +293,7 @@ mod tests {
     #[test]
     fn repetitions_differ_in_seeds_and_series_in_algorithms() {
         let runs = vec![
-            run(&["run.seed=1", "policy.algorithm=central-v"]),
+            run(&["run.seed=1", "algorithm.name=central-v"]),
             run(&["run.seed=1"]),
             run(&["run.seed=2", "run.checkpoints_kept=7"]),
         ];
@@ -299,16 +306,16 @@ mod tests {
         let runs = || {
             vec![
                 run(&["run.seed=1"]),
-                run(&["run.seed=2", "learner.gamma=0.5"]),
+                run(&["run.seed=2", "algorithm.gamma=0.5"]),
             ]
         };
         let refusal = names(runs(), &Selection::default()).unwrap_err();
         assert!(
-            refusal.ends_with("differ in learner.gamma: 0.99 and 0.5"),
+            refusal.ends_with("differ in algorithm.gamma: 0.99 and 0.5"),
             "{refusal}"
         );
         let by = Selection {
-            by: vec!["learner.gamma".to_owned()],
+            by: vec!["algorithm.gamma".to_owned()],
             ..Selection::default()
         };
         let expected = [
@@ -367,12 +374,12 @@ mod tests {
     #[test]
     fn a_misspelt_setting_finds_its_neighbour() {
         let by = Selection {
-            by: vec!["learner.gama".to_owned()],
+            by: vec!["algorithm.gama".to_owned()],
             ..Selection::default()
         };
         let refusal = names(vec![run(&[])], &by).unwrap_err();
         assert!(
-            refusal.contains("did you mean `learner.gamma`"),
+            refusal.contains("did you mean `algorithm.gamma`"),
             "{refusal}"
         );
     }

@@ -35,7 +35,7 @@ impl Summary {
             dead_enemies,
         } = playback.statistics;
         Self {
-            map: replay.env.map.clone(),
+            map: replay.env.map().to_owned(),
             policy: replay.player.name(),
             seed: replay.key.seed,
             episode: replay.key.episode,

@@ -87,13 +87,14 @@ impl Disk for FaultyDisk {
 }
 
 fn config() -> Config {
-    let mut config = Config::default();
-    config.policy.hidden = 3;
-    config.policy.algorithm = mackrl_run::config::Algorithm::CentralV;
-    config.learner.environments = 2;
-    config.test.episodes = 1;
-    config.run.checkpoints_kept = 1;
-    config
+    let settings = [
+        "algorithm.name=central-v",
+        "algorithm.hidden=3",
+        "algorithm.environments=2",
+        "test.episodes=1",
+        "run.checkpoints_kept=1",
+    ];
+    Config::with(&settings).expect("settings that there are")
 }
 
 /// Three checkpoints of one run.

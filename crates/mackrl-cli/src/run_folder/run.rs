@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use mackrl_run::{
-    config::{Config, ConfigBuilder},
+    config::{Config, ConfigBuilder, Registry},
     training::assembly::tensors_bytes_max,
 };
 
@@ -74,8 +74,8 @@ pub(super) fn read_config(path: &Path) -> anyhow::Result<Config> {
         return Err(Failure::NotARun { folder }.into());
     }
     let text = bounded::read_text(&config_path, untrusted::TEXT_MAX)?;
-    let config = ConfigBuilder::new()
-        .file(&config_path.display().to_string(), &text)?
+    let config = ConfigBuilder::new(&Registry::built_in())
+        .recorded(&config_path.display().to_string(), &text)?
         .build()?;
     Ok(config)
 }

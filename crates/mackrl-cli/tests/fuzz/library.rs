@@ -6,7 +6,7 @@ use fastrand::Rng;
 use flate2::{Compression, read::GzDecoder, write::GzEncoder};
 use mackrl_env::{EpisodeKey, Stream, random_play::RandomPlay};
 use mackrl_run::{
-    config::{Config, ConfigBuilder, presets},
+    config::{Config, ConfigBuilder, Registry},
     replay::{Replay, record_script},
     training::{Checkpoint, Trainer, assembly, read_weights},
 };
@@ -32,13 +32,17 @@ impl Target for Configuration {
     }
 
     fn seeds(&self) -> Vec<Vec<u8>> {
-        let presets = presets().iter().map(|preset| preset.text.to_owned());
+        let registry = Registry::built_in();
+        let presets = registry.presets().map(|preset| preset.text.to_owned());
         let complete = [Config::default().to_toml()];
         presets.chain(complete).map(String::into_bytes).collect()
     }
 
     fn words(&self) -> Vec<String> {
-        let settings = Config::settings().into_iter().map(|setting| setting.key);
+        let settings = Registry::built_in()
+            .settings()
+            .into_iter()
+            .map(|setting| setting.key);
         let values = [
             "true",
             "\"sampled:9999\"",
@@ -51,16 +55,17 @@ impl Target for Configuration {
 
     fn read(&mut self, input: &[u8]) -> Result<(), String> {
         let text = String::from_utf8_lossy(input);
-        let built = ConfigBuilder::new()
+        let built = ConfigBuilder::new(&Registry::built_in())
             .file("stranger.toml", &text)
             .and_then(|builder| builder.build());
-        let assigned = ConfigBuilder::new()
+        let assigned = ConfigBuilder::new(&Registry::built_in())
             .set(&text)
             .and_then(|builder| builder.build());
         for result in [built, assigned] {
             match result {
                 Ok(config) => {
-                    let again = ConfigBuilder::new().file("again", &config.to_toml());
+                    let again =
+                        ConfigBuilder::new(&Registry::built_in()).file("again", &config.to_toml());
                     if again.and_then(|builder| builder.build()) != Ok(config) {
                         return Err(
                             "a configuration that is accepted cannot be read again".to_owned()
@@ -113,12 +118,13 @@ impl Target for Scenario {
 
 /// The smallest team that can be trained.
 fn small() -> Config {
-    let mut config = Config::default();
-    config.policy.hidden = 2;
-    config.learner.environments = 1;
-    config.test.episodes = 1;
-    config.run.steps_env = 300;
-    config
+    let settings = [
+        "algorithm.hidden=2",
+        "algorithm.environments=1",
+        "test.episodes=1",
+        "run.steps_env=300",
+    ];
+    Config::with(&settings).expect("settings that there are")
 }
 
 /// Words of the formats in which weights and counters are kept.
@@ -184,8 +190,8 @@ impl Target for Weights {
     fn read(&mut self, input: &[u8]) -> Result<(), String> {
         let layout = self.layout.get_or_insert_with(|| {
             let world = assembly::World::new(&small()).expect("a shipped map");
-            let policy = assembly::policy(&small(), &world).expect("a small team");
-            policy.layout().clone()
+            let team = assembly::algorithm(&small(), &world, 1).expect("a small team");
+            team.policy().layout().clone()
         });
         match read_weights(layout, input) {
             Ok(weights) if weights.iter().any(|weight| !weight.is_finite()) => {

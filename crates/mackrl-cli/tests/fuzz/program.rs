@@ -217,8 +217,7 @@ impl Target for RunFolders {
     }
 
     fn seeds(&self) -> Vec<Vec<u8>> {
-        let settings =
-            "--set policy.hidden=2 --set learner.environments=1 --set test.episodes=1 --steps 150";
+        let settings = "--set algorithm.hidden=2 --set algorithm.environments=1 --set test.episodes=1 --steps 150";
         succeed(
             &format!("train --map 3m --out sound --threads 1 {settings}"),
             self.folder.path(),

@@ -2,7 +2,6 @@
 
 use std::fmt;
 
-use mackrl_env::settings::Violation;
 use thiserror::Error;
 
 /// Where a value was written; later layers are greater.
@@ -31,10 +30,10 @@ pub enum Origin {
     },
     /// The command line.
     CommandLine {
-        /// The flag with its value, such as `--set learner.gamma=2`.
+        /// The flag with its value, such as `--set algorithm.gamma=2`.
         text: String,
     },
-    /// A value that follows from the world, because nobody asked for another.
+    /// A value that follows from the world, because no other was asked for.
     Automatic {
         /// Why it is what it is.
         why: &'static str,
@@ -80,6 +79,30 @@ pub enum ConfigError {
         /// The most similar key, if one is similar at all.
         nearest: Option<String>,
     },
+    /// A key that is called otherwise now.
+    #[error("{origin}: `{key}` is called `{new}` now")]
+    RenamedKey {
+        /// Where.
+        origin: Origin,
+        /// The key.
+        key: String,
+        /// Its name now.
+        new: String,
+    },
+    /// A key that the chosen kind of world or algorithm does not have, but another has.
+    #[error("{origin}: `{key}` is a setting of `{owner}`, but `{section}.name` is `{chosen}`")]
+    ForeignKey {
+        /// Where.
+        origin: Origin,
+        /// The key.
+        key: String,
+        /// The kind that has it.
+        owner: String,
+        /// The section.
+        section: String,
+        /// The kind that is chosen.
+        chosen: String,
+    },
     /// A value of the wrong type or out of its range.
     #[error("{origin}: `{key}` is {found}, expected {expected}")]
     WrongValue {
@@ -108,6 +131,12 @@ pub enum ConfigError {
         /// File, line and column, what was found and what was expected.
         message: String,
     },
+    /// A world that cannot be had here, whatever its settings.
+    #[error("{message}")]
+    World {
+        /// What is missing or broken.
+        message: String,
+    },
     /// A preset that is not shipped.
     #[error("unknown preset `{name}`, expected {expected}{}", suggestion(nearest.as_deref()))]
     UnknownPreset {
@@ -121,39 +150,16 @@ pub enum ConfigError {
 }
 
 impl ConfigError {
-    /// The error for a value that the setting in this section does not take.
-    pub(super) fn violation(
-        section: &str,
-        violation: Violation,
-        origin_of: impl Fn(&str) -> Origin,
+    /// The error for a `key` that is not among the `known` ones.
+    pub(super) fn unknown_key<'a>(
+        origin: Origin,
+        key: &str,
+        known: impl IntoIterator<Item = &'a str>,
     ) -> Self {
-        let key = format!("{section}.{}", violation.name);
-        Self::WrongValue {
-            origin: origin_of(&key),
-            key,
-            found: violation.found,
-            expected: violation.accepts.to_string(),
-        }
-    }
-
-    /// The error for two values that do not go together, each given as key, value and what is expected beside the other: it
-    /// names the one that was written later.
-    pub(super) fn at_odds(
-        origin_of: &impl Fn(&str) -> Origin,
-        one: (&str, String, String),
-        other: (&str, String, String),
-    ) -> Self {
-        let later = if origin_of(other.0) > origin_of(one.0) {
-            other
-        } else {
-            one
-        };
-        let (key, found, expected) = later;
-        Self::WrongValue {
-            origin: origin_of(key),
-            key: key.to_owned(),
-            found,
-            expected,
+        Self::UnknownKey {
+            origin,
+            key: shortened(key),
+            nearest: nearest(key, known),
         }
     }
 
@@ -189,13 +195,22 @@ pub(super) fn shortened(text: &str) -> String {
     short
 }
 
+/// "`a`, `b` or `c`"
+pub(super) fn one_of(names: &[&str]) -> String {
+    let quoted: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+    match quoted.split_last() {
+        Some((last, others)) if !others.is_empty() => format!("{} or {last}", others.join(", ")),
+        _ => quoted.concat(),
+    }
+}
+
 fn suggestion(nearest: Option<&str>) -> String {
     nearest.map_or_else(String::new, |name| format!(", did you mean `{name}`?"))
 }
 
 /// The name among `candidates` that is most similar to `name`, if one is similar at all.
 ///
-/// Dotted keys are compared as a whole and by their last part, so that `gama` finds `learner.gamma`.
+/// Dotted keys are compared as a whole and by their last part, so that `gama` finds `algorithm.gamma`.
 #[must_use]
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
     const SIMILAR: f64 = 0.6;
@@ -226,14 +241,20 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
 mod tests {
     use super::*;
 
-    const KEYS: [&str; 3] = ["learner.gamma", "learner.lambda", "exploration.start"];
+    const KEYS: [&str; 3] = ["algorithm.gamma", "algorithm.lambda", "test.episodes"];
 
     #[test]
     fn a_misspelt_key_finds_its_neighbour() {
-        for name in ["learner.gama", "gamma", "gama", "lerner.gamma", "run.gamma"] {
+        for name in [
+            "algorithm.gama",
+            "gamma",
+            "gama",
+            "algoritm.gamma",
+            "run.gamma",
+        ] {
             assert_eq!(
                 nearest(name, KEYS).as_deref(),
-                Some("learner.gamma"),
+                Some("algorithm.gamma"),
                 "{name}"
             );
         }

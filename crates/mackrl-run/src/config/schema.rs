@@ -1,30 +1,26 @@
-//! The settings as a JSON schema, for editors and for whoever writes configurations by program.
+//! The settings as a JSON schema, for editors and for programs that write configurations.
 
 use std::ops::Bound::{self, Excluded, Included, Unbounded};
 
-use mackrl_env::settings::Accepts;
+use mackrl_env::settings::{Accepts, Setting};
 use serde_json::{Map, Value, json};
 
-use crate::config::{Config, Setting};
+use crate::config::{Kind, Registry, RunConfig, TestConfig};
 
 /// A JSON schema (draft 2020-12) of configuration files: every key with its meaning, its values and its built-in value.
 ///
-/// What depends on another key or on a file, such as that a map exists, cannot be said there; [`Config::validate`] checks it.
+/// A section that names a kind takes the settings of every kind, and a table for each kind. What depends on another key or on a
+/// file, such as that the chosen kind has a setting or that a map exists, cannot be said there;
+/// [`Config::validate`](crate::config::Config::validate) checks it.
 #[must_use]
-pub fn schema() -> Value {
-    let built_in = Config::default();
+pub fn schema(registry: &Registry) -> Value {
     let mut root = object();
-    for setting in Config::settings() {
-        let property = property(&setting, built_in.get(&setting.key));
-        let mut place = &mut root;
-        for name in setting.key.split('.') {
-            place = &mut place["properties"][name];
-            if place.is_null() {
-                *place = object();
-            }
-        }
-        *place = property;
-    }
+    root["properties"] = json!({
+        "env": kinds(registry.worlds().map(|kind| &**kind)),
+        "algorithm": kinds(registry.algorithms().map(|kind| &**kind)),
+        "test": section(TestConfig::SETTINGS, &table(&TestConfig::default())),
+        "run": section(RunConfig::SETTINGS, &table(&RunConfig::default())),
+    });
     root["$schema"] = json!("https://json-schema.org/draft/2020-12/schema");
     root["title"] = json!("Configuration of a mackrl run");
     root
@@ -34,7 +30,60 @@ fn object() -> Value {
     json!({ "type": "object", "additionalProperties": false, "properties": {} })
 }
 
-fn property(setting: &Setting, built_in: Option<toml::Value>) -> Value {
+fn table(settings: &impl mackrl_env::settings::Settings) -> toml::Table {
+    toml::Table::try_from(settings).unwrap_or_default()
+}
+
+/// A table of settings.
+fn section(declared: &[Setting], built_in: &toml::Table) -> Value {
+    let mut section = object();
+    for setting in declared {
+        section["properties"][setting.name] = property(setting, built_in.get(setting.name));
+    }
+    section
+}
+
+/// The section in which one of these kinds is named.
+fn kinds<'a, K: Kind + ?Sized + 'a>(kinds: impl Iterator<Item = &'a K>) -> Value {
+    let mut whole = object();
+    let mut names = Vec::new();
+    for kind in kinds {
+        let own = section(&kind.declared(), &kind.built_in());
+        for (name, property) in own["properties"].as_object().into_iter().flatten() {
+            let place = &mut whole["properties"][name];
+            if place.is_null() {
+                *place = property.clone();
+            } else if *place != *property {
+                *place = either(place.take(), property.clone());
+            }
+        }
+        names.push((kind.called().to_owned(), own));
+    }
+    let all: Vec<&String> = names.iter().map(|(name, _)| name).collect();
+    whole["properties"]["name"] = json!({
+        "enum": all,
+        "default": all.first(),
+        "description": "What is chosen; which other settings there are depends on it.",
+    });
+    for (name, mut own) in names {
+        own["description"] = json!(format!("Holds only if name is {name}."));
+        whole["properties"][&name] = own;
+    }
+    whole
+}
+
+/// What one of two kinds takes.
+fn either(one: Value, other: Value) -> Value {
+    match one.get("anyOf").and_then(Value::as_array) {
+        Some(any) => {
+            let all = [&any[..], &[other]].concat();
+            json!({ "anyOf": all })
+        }
+        None => json!({ "anyOf": [one, other] }),
+    }
+}
+
+fn property(setting: &Setting, built_in: Option<&toml::Value>) -> Value {
     let mut property = accepted(setting.accepts);
     property.insert("description".to_owned(), json!(setting.meaning));
     if let Some(built_in) = built_in {
@@ -89,7 +138,7 @@ fn bound(
 
 #[cfg(test)]
 mod tests {
-    use crate::config::{ConfigBuilder, presets};
+    use crate::config::{Config, ConfigBuilder};
 
     use super::*;
 
@@ -128,9 +177,10 @@ mod tests {
 
     #[test]
     fn every_shipped_configuration_is_as_the_schema_says() {
-        let schema = schema();
-        for preset in presets() {
-            let config = ConfigBuilder::new().preset(preset.name).unwrap();
+        let registry = Registry::built_in();
+        let schema = schema(&registry);
+        for preset in registry.presets() {
+            let config = ConfigBuilder::new(&registry).preset(preset.name).unwrap();
             let complete = serde_json::to_value(config.build().unwrap()).unwrap();
             assert_eq!(differs(&schema, &complete, ""), None, "{}", preset.name);
             let written: toml::Table = preset.text.parse().unwrap();
@@ -141,26 +191,31 @@ mod tests {
 
     #[test]
     fn the_schema_refuses_what_the_program_refuses() {
-        let schema = schema();
+        let registry = Registry::built_in();
+        let schema = schema(&registry);
         for (text, path) in [
-            ("[learner]\ngamma = 1.5", ".learner.gamma"),
-            ("[learner]\nlearning_rate = 0.0", ".learner.learning_rate"),
-            ("[learner]\ngama = 0.5", ".learner.gama"),
+            ("[algorithm]\ngamma = 1.5", ".algorithm.gamma"),
+            (
+                "[algorithm]\nlearning_rate = 0.0",
+                ".algorithm.learning_rate",
+            ),
+            ("[algorithm]\ngama = 0.5", ".algorithm.gama"),
             ("[run]\nseed = -1", ".run.seed"),
-            ("[policy]\nalgorithm = \"qmix\"", ".policy.algorithm"),
-            ("[env.matrix_game]\npayoffs = 3", ".env.matrix_game.payoffs"),
+            ("[algorithm]\nname = \"qmix\"", ".algorithm.name"),
+            ("[env.matrix-game]\npayoffs = 3", ".env.matrix-game.payoffs"),
             ("[env]\nreward_sparse = 1", ".env.reward_sparse"),
         ] {
             let value = serde_json::to_value(text.parse::<toml::Table>().unwrap()).unwrap();
             assert_eq!(differs(&schema, &value, "").as_deref(), Some(path));
-            let read = ConfigBuilder::new().file("x", text);
+            let read = ConfigBuilder::new(&registry).file("x", text);
             assert!(read.and_then(|builder| builder.build()).is_err(), "{text}");
         }
     }
 
     #[test]
     fn every_key_of_a_complete_configuration_is_declared_and_explained() {
-        let declared: Vec<String> = Config::settings()
+        let declared: Vec<String> = Config::default()
+            .settings()
             .into_iter()
             .map(|setting| {
                 assert!(setting.meaning.ends_with('.'), "{}", setting.key);

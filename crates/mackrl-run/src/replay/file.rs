@@ -12,7 +12,7 @@ use mackrl_skirmish::SIMULATOR_VERSION;
 use serde::{Deserialize, Serialize};
 
 use super::{Player, Replay, ReplayError, STEPS_MOST, Step};
-use crate::config::EnvironmentConfig;
+use crate::config::{ConfigBuilder, EnvironmentConfig, Registry};
 
 const FORMAT: &str = "mackrl-replay";
 const VERSION: u32 = 1;
@@ -24,13 +24,13 @@ const EPISODES_MOST: u64 = 1 << 56;
 /// The first line.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Header {
+struct Header<E> {
     format: String,
     version: u32,
     program: String,
     simulator: u32,
     steps: usize,
-    env: EnvironmentConfig,
+    env: E,
     key: EpisodeKey,
     player: Player,
 }
@@ -60,9 +60,9 @@ impl Replay {
             program: self.program.clone(),
             simulator: SIMULATOR_VERSION,
             steps: self.steps.len(),
-            env: self.env.clone(),
+            env: &self.env,
             key: self.key,
-            player: self.player,
+            player: self.player.clone(),
         };
         let mut lines = vec![json(&header)];
         lines.extend(self.steps.iter().map(json));
@@ -130,7 +130,7 @@ impl<R: Read> Lines<R> {
     }
 }
 
-fn header(line: &[u8]) -> Result<Header, ReplayError> {
+fn header(line: &[u8]) -> Result<Header<EnvironmentConfig>, ReplayError> {
     let head: Head = serde_json::from_slice(line)
         .map_err(|error| ReplayError::Damaged(format!("no replay of mackrl: {error}")))?;
     if head.format != FORMAT || head.version != VERSION {
@@ -147,7 +147,7 @@ fn header(line: &[u8]) -> Result<Header, ReplayError> {
             own: SIMULATOR_VERSION,
         });
     }
-    let header: Header =
+    let header: Header<toml::Table> =
         serde_json::from_slice(line).map_err(|error| damaged(&format!("header: {error}")))?;
     if header.steps > STEPS_MOST {
         let message = format!("{} steps, expected at most {STEPS_MOST}", header.steps);
@@ -156,10 +156,30 @@ fn header(line: &[u8]) -> Result<Header, ReplayError> {
     if header.key.episode >= EPISODES_MOST {
         return Err(damaged("key.episode is 2^56 or more, expected less"));
     }
-    if header.env.map.chars().any(char::is_control) {
-        return Err(damaged("env.map has control characters, expected a name"));
+    let env = ConfigBuilder::new(&Registry::built_in())
+        .recorded_environment(&header.env)
+        .build_environment()
+        .map_err(|error| damaged(&format!("env: {error}")))?;
+    let mut names = vec![("env.map", env.map())];
+    if let Player::Policy { algorithm, .. } = &header.player {
+        names.push(("player.algorithm", algorithm));
     }
-    Ok(header)
+    for (key, name) in names {
+        if name.chars().any(char::is_control) {
+            let message = format!("{key} has control characters, expected a name");
+            return Err(damaged(&message));
+        }
+    }
+    Ok(Header {
+        env,
+        format: header.format,
+        version: header.version,
+        program: header.program,
+        simulator: header.simulator,
+        steps: header.steps,
+        key: header.key,
+        player: header.player,
+    })
 }
 
 fn damaged(message: &str) -> ReplayError {

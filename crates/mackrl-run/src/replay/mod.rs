@@ -28,7 +28,7 @@ pub use self::{
 };
 use mackrl::policy::{Behaviour, Thought};
 
-use crate::config::{Algorithm, EnvironmentConfig};
+use crate::config::EnvironmentConfig;
 
 /// Most steps of a replay; all states of so many steps of the largest map fit into a few hundred megabytes.
 pub const STEPS_MOST: usize = 20_000;
@@ -49,7 +49,7 @@ pub struct Replay {
 }
 
 /// Who plays the team.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", tag = "kind", deny_unknown_fields)]
 pub enum Player {
     /// A script.
@@ -60,7 +60,7 @@ pub enum Player {
     /// A policy that was learnt.
     Policy {
         /// How it learnt.
-        algorithm: Algorithm,
+        algorithm: String,
         /// How it chose.
         behaviour: Behaviour,
     },

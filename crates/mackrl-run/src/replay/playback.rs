@@ -37,7 +37,6 @@ impl Replay {
     /// not be taken.
     pub fn play(&self) -> Result<Playback, ReplayError> {
         let invalid = |error: String| ReplayError::Damaged(format!("damaged replay: env: {error}"));
-        (self.env.validate()).map_err(|error| invalid(error.to_string()))?;
         let skirmish = (self.env.skirmish()).map_err(|error| invalid(error.to_string()))?;
         let mut observations = Observations::new(skirmish.spec(), 1);
         let mut playback = Playback {

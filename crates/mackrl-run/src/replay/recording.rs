@@ -1,14 +1,12 @@
 //! Episodes that are played in order to be kept.
 
-use std::{ffi::OsStr, path::Path};
-
 use mackrl::{
     Error, NotFinite,
     algorithms::Algorithm,
     experience::Experience,
     policy::{Actor, Behaviour, Recording, Situation, Thought},
 };
-use mackrl_env::{Action, Environment, EpisodeKey, Observations, matrix_game::MATRIX_GAME};
+use mackrl_env::{Action, Environment, EpisodeKey, Observations};
 use mackrl_skirmish::{
     Skirmish,
     scripted::{ScriptedPolicy, ScriptedTeam},
@@ -55,15 +53,10 @@ pub fn record_policy(
     behaviour: Behaviour,
     key: EpisodeKey,
 ) -> Result<Replay, Error> {
-    if config.env.scenario.is_empty() && config.env.map == MATRIX_GAME {
-        return Err(Error::Config(format!(
-            "`{MATRIX_GAME}` has no units to look at, expected a map of battles to make a replay of"
-        )));
-    }
     let skirmish = config.env.skirmish()?;
     let mut watched = Watched::new(config, weights, behaviour, key)?;
     let player = Player::Policy {
-        algorithm: config.policy.algorithm,
+        algorithm: config.algorithm.name().to_owned(),
         behaviour,
     };
     record(
@@ -127,17 +120,6 @@ impl Watched {
     }
 }
 
-/// The world, with a scenario's file by its name alone: where it lies on this machine concerns nobody.
-fn without_folder(env: &EnvironmentConfig) -> EnvironmentConfig {
-    let mut env = env.clone();
-    if !env.scenario.is_empty()
-        && let Some(name) = Path::new(&env.map).file_name().and_then(OsStr::to_str)
-    {
-        env.map = name.to_owned();
-    }
-    env
-}
-
 /// The critic's value, and what the controllers computed, of a team that has them.
 type Chosen = (Option<f32>, Option<Thought>);
 
@@ -152,7 +134,7 @@ fn record(
     let mut actions = vec![Action::default(); skirmish.spec().agents];
     let mut replay = Replay {
         program: env!("CARGO_PKG_VERSION").to_owned(),
-        env: without_folder(env),
+        env: env.without_folder(),
         key,
         player,
         steps: Vec::new(),

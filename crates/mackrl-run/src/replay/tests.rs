@@ -7,16 +7,12 @@ use mackrl_skirmish::SIMULATOR_VERSION;
 
 use super::*;
 use crate::{
-    config::{Config, ConfigBuilder},
+    config::{Config, ConfigBuilder, Registry},
     training::{Trainer, evaluate},
 };
 
 fn config(overrides: &[&str]) -> Config {
-    let builder = ConfigBuilder::new().set("run.steps_env=100").unwrap();
-    let builder = overrides
-        .iter()
-        .try_fold(builder, |builder, assignment| builder.set(assignment));
-    builder.unwrap().build().unwrap()
+    Config::with(&[&["run.steps_env=100"], overrides].concat()).unwrap()
 }
 
 /// An episode of an untrained team that explores.
@@ -52,8 +48,8 @@ fn error_after(replay: &Replay, change: impl Fn(String) -> String) -> ReplayErro
 fn a_replay_comes_back_from_its_bytes_and_plays_as_recorded() {
     for overrides in [
         &["env.map=2s3z"][..],
-        &["policy.algorithm=central-v"],
-        &["policy.partitions=round-robin"],
+        &["algorithm.name=central-v"],
+        &["algorithm.partitions=round-robin"],
     ] {
         let replay = sampled(overrides);
         let read = Replay::from_bytes(&replay.to_bytes()).unwrap();
@@ -274,15 +270,21 @@ fn in_figure_1_two_agents_commonly_know_what_both_see_and_the_third_stands_apart
         env!("CARGO_MANIFEST_DIR"),
         "/../../examples/scenarios/figure1.toml"
     );
-    let mut env = EnvironmentConfig {
-        map: "folder/figure1.toml".to_owned(),
-        scenario: std::fs::read_to_string(file).unwrap(),
-        ..EnvironmentConfig::default()
-    };
-    (env.settings.sight_range, env.settings.shoot_range) = (6.0, 4.0);
+    let env = ConfigBuilder::new(&Registry::built_in())
+        .set("env.map=folder/figure1.toml")
+        .and_then(|builder| builder.set("env.sight_range=6"))
+        .and_then(|builder| builder.set("env.shoot_range=4"))
+        .unwrap()
+        .scenario(&std::fs::read_to_string(file).unwrap())
+        .build_environment()
+        .unwrap();
     let key = EpisodeKey::new(1, Stream::Other, 0);
     let replay = record_script(&env, ScriptedPolicy::Idle, key).unwrap();
-    assert_eq!(replay.env.map, "figure1.toml", "no folder of this machine");
+    assert_eq!(
+        replay.env.map(),
+        "figure1.toml",
+        "no folder of this machine"
+    );
     let playback = replay.play().unwrap();
     let names = Names::new(&playback.skirmish);
     let known = |set: EntitySet| -> Vec<String> { set.iter().map(|e| names.entity(e)).collect() };

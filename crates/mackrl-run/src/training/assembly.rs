@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use mackrl::{
     Error,
-    algorithms::{self, Algorithm, Team},
+    algorithms::{Algorithm, Team},
 };
 use mackrl_env::{Environment, EnvironmentSpec, PriorKnowledge, WorldError};
 
@@ -18,7 +18,7 @@ pub struct World {
 }
 
 impl World {
-    /// Reads the configuration's `env` section, for worlds in the built-in simulator.
+    /// Reads the configuration's `env` section, for worlds that its kind builds.
     ///
     /// # Errors
     /// [`Error::Config`] if there is no such map or the world refuses a setting.
@@ -69,17 +69,16 @@ pub fn algorithm(
     world: &World,
     threads: usize,
 ) -> Result<Box<dyn Algorithm>, Error> {
-    let (name, table) = algorithm_table(config);
-    let kinds = algorithms::built_in();
-    let kind = kinds.into_iter().find(|kind| kind.name() == name);
-    let kind = kind.ok_or_else(|| Error::Config(format!("no algorithm is called `{name}`")))?;
     let team = Team {
         spec: world.spec(),
         prior: &world.prior(),
         seed: config.run.seed,
         threads,
     };
-    kind.build(&table, team)
+    config
+        .algorithm
+        .kind()
+        .build(config.algorithm.table(), team)
 }
 
 /// As [`algorithm`], with the weights of a finished run, which are a safetensors file.
@@ -94,33 +93,6 @@ pub fn trained(
     let mut algorithm = algorithm(config, world, 1)?;
     algorithm.load(&StoredWeights(weights))?;
     Ok(algorithm)
-}
-
-/// The algorithm's name and its table.
-fn algorithm_table(config: &Config) -> (String, toml::Table) {
-    let mut whole = config.to_table();
-    let mut table = toml::Table::new();
-    let mut section = |name: &str, prefix: &str, table: &mut toml::Table| {
-        if let Some(toml::Value::Table(own)) = whole.remove(name) {
-            table.extend(
-                own.into_iter()
-                    .map(|(key, value)| (format!("{prefix}{key}"), value)),
-            );
-        }
-    };
-    section("policy", "", &mut table);
-    section("exploration", "exploration_", &mut table);
-    section("learner", "", &mut table);
-    let name = table.remove("algorithm");
-    let name = name
-        .and_then(|name| name.as_str().map(str::to_owned))
-        .unwrap_or_default();
-    if name == "central-v" {
-        for other in ["common_knowledge", "partitions", "selector", "delegation"] {
-            table.remove(other);
-        }
-    }
-    (name, table)
 }
 
 /// Bytes that no file of weights or of a checkpoint's tensors exceeds in a run that `config` describes: a file that a stranger

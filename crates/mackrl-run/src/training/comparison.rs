@@ -163,15 +163,17 @@ fn compare_models(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Algorithm, Config};
+    use crate::config::Config;
 
     fn trainer(threads: usize, change: impl FnOnce(&mut Config)) -> Trainer {
-        let mut config = Config::default();
-        config.policy.algorithm = Algorithm::CentralV;
-        config.policy.hidden = 5;
-        config.learner.environments = 3;
-        config.test.episodes = 1;
-        config.run.steps_env = 700;
+        let settings = [
+            "algorithm.name=central-v",
+            "algorithm.hidden=5",
+            "algorithm.environments=3",
+            "test.episodes=1",
+            "run.steps_env=700",
+        ];
+        let mut config = Config::with(&settings).unwrap();
         change(&mut config);
         Trainer::new(&config, threads).unwrap()
     }
@@ -202,7 +204,7 @@ mod tests {
         assert_eq!(step.place[0].0, "episode");
         assert_ne!(one.experience_hash(), other.experience_hash());
 
-        let faster = |config: &mut Config| config.learner.learning_rate = 1e-3;
+        let faster = |config: &mut Config| config.algorithm.set("learning_rate", 1e-3).unwrap();
         let (mut one, mut other) = (trainer(1, |_| ()), trainer(1, faster));
         assert_eq!(one.compare_parameters(&other), None);
         one.next_batch().unwrap();

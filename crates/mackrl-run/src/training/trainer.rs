@@ -416,10 +416,12 @@ mod tests {
 
     #[test]
     fn an_update_that_is_given_up_leaves_no_trace() {
-        let mut config = Config::default();
-        config.policy.hidden = 3;
-        config.learner.environments = 2;
-        config.test.episodes = 2;
+        let settings = [
+            "algorithm.hidden=3",
+            "algorithm.environments=2",
+            "test.episodes=2",
+        ];
+        let config = Config::with(&settings).unwrap();
         let mut trainer = Trainer::new(&config, 1).unwrap();
         let stop = Arc::default();
         trainer.stop_when(&stop);

@@ -45,7 +45,7 @@ impl PartitionSchedule {
             Self::All if agents > Self::MOST_AGENTS_ENUMERATED => {
                 return Err(Error::Config(format!(
                     "partition schedule `all` takes at most {} agents, found {agents} with {} partitions; \
-                     set `policy.partitions` to `round-robin` or `sampled:K`",
+                     set `algorithm.partitions` to `round-robin` or `sampled:K`",
                     Self::MOST_AGENTS_ENUMERATED,
                     partition_count(agents)
                 )));

@@ -7,18 +7,21 @@ use mackrl::{
 };
 use mackrl_env::{EpisodeKey, Stream};
 use mackrl_run::{
-    config::{Config, ConfigBuilder},
+    config::Config,
     training::assembly::{self, World},
 };
 
 /// The configuration with these settings over the built-in ones.
 pub(crate) fn config(settings: &[&str]) -> Config {
-    let builder = settings
-        .iter()
-        .fold(ConfigBuilder::new(), |builder, setting| {
-            builder.set(setting).expect("a known setting")
-        });
-    builder.build().expect("settings within their ranges")
+    Config::with(settings).expect("known settings within their ranges")
+}
+
+/// The setting that chooses a map, or a world that has none.
+pub(crate) fn world_setting(map: &str) -> String {
+    match map {
+        "matrix-game" => format!("env.name={map}"),
+        map => format!("env.map={map}"),
+    }
 }
 
 /// A policy and the worlds it plays in.

@@ -36,7 +36,7 @@ struct Player {
 
 pub(super) fn run(args: &BenchEnvironmentArgs) -> anyhow::Result<()> {
     let world = world(
-        ConfigBuilder::new(),
+        ConfigBuilder::new(crate::registry()),
         &format!("--map {}", args.map),
         &args.map,
         &[],

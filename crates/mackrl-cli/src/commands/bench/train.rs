@@ -68,12 +68,9 @@ fn measure(args: &BenchTrainArgs) -> anyhow::Result<TrainingSpeed> {
     let spent_s = |phase| trainer.stopwatch().spent(phase).as_secs_f64();
     let total_s: f64 = Phase::ALL.map(spent_s).iter().sum();
     let share = |phase: Phase| (phase.name(), spent_s(phase) / total_s.max(1e-9));
-    let algorithm = config.get("policy.algorithm");
     Ok(TrainingSpeed {
-        map: config.env.map.clone(),
-        algorithm: algorithm
-            .and_then(|name| name.as_str().map(str::to_owned))
-            .unwrap_or_default(),
+        map: config.env.map().to_owned(),
+        algorithm: config.algorithm.name().to_owned(),
         preset: typed.preset.clone(),
         simd: InstructionSet::chosen()?.name(),
         threads,

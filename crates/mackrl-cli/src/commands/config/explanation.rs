@@ -1,6 +1,8 @@
 //! What is to be known about one setting.
 
-use mackrl_run::config::{Config, ConfigBuilder, ConfigError, Origin, Setting, presets};
+use mackrl_run::config::{
+    Config, ConfigBuilder, ConfigError, Origin, Preset, Registry, Resolved, Setting, remark,
+};
 use serde::Serialize;
 
 /// A setting with its meaning, and its value wherever it has one.
@@ -29,38 +31,64 @@ struct PresetValue {
     remark: Option<&'static str>,
 }
 
-impl Explanation {
-    /// Of a setting, in the configuration that `layers` gave.
+/// Settings are explained with their values here, and with those that they have otherwise.
+#[derive(Debug)]
+pub(super) struct Explainer<'a> {
+    resolved: &'a Resolved,
+    built_in: Config,
+    presets: Vec<(Preset, Config)>,
+}
+
+impl<'a> Explainer<'a> {
+    /// For the kinds of world and algorithm that `resolved` has.
     ///
     /// # Errors
     /// Never: shipped presets can be read.
-    pub(super) fn of(
-        setting: &Setting,
-        config: &Config,
-        layers: &ConfigBuilder,
-    ) -> Result<Self, ConfigError> {
-        let key = &setting.key;
-        let in_presets = presets().iter().map(|preset| {
-            let config = ConfigBuilder::new().preset(preset.name)?.build()?;
-            Ok(PresetValue {
-                preset: preset.name,
-                value: config.get(key),
-                remark: preset.remark(key),
-            })
-        });
-        let origin = layers.origin(key);
+    pub(super) fn new(registry: &Registry, resolved: &'a Resolved) -> Result<Self, ConfigError> {
+        let Config { env, algorithm, .. } = resolved.config();
+        let same = |builder: ConfigBuilder| {
+            builder
+                .set(&format!("env.name={}", env.name()))?
+                .set(&format!("algorithm.name={}", algorithm.name()))?
+                .build()
+        };
+        let of_preset = |preset: Preset| {
+            let builder = ConfigBuilder::new(registry).preset(preset.name)?;
+            Ok((preset, same(builder)?))
+        };
         Ok(Self {
-            key: key.clone(),
-            meaning: setting.meaning,
-            accepts: setting.accepts.to_string(),
-            built_in: Config::default().get(key),
-            presets: in_presets.collect::<Result<_, _>>()?,
-            value: config.get(key),
-            changed: !matches!(origin, Origin::BuiltIn | Origin::Preset { .. }),
-            origin: origin.to_string(),
+            resolved,
+            built_in: same(ConfigBuilder::new(registry))?,
+            presets: registry
+                .presets()
+                .map(of_preset)
+                .collect::<Result<_, _>>()?,
         })
     }
 
+    /// What is to be known about a setting.
+    pub(super) fn explain(&self, setting: &Setting) -> Explanation {
+        let key = &setting.key;
+        let in_presets = self.presets.iter().map(|(preset, config)| PresetValue {
+            preset: preset.name,
+            value: config.get(key),
+            remark: remark(*preset, key),
+        });
+        let origin = self.resolved.origin(key);
+        Explanation {
+            key: key.clone(),
+            meaning: setting.meaning,
+            accepts: setting.accepts.to_string(),
+            built_in: self.built_in.get(key),
+            presets: in_presets.collect(),
+            value: self.resolved.config().get(key),
+            changed: !matches!(origin, Origin::BuiltIn | Origin::Preset { .. }),
+            origin: origin.to_string(),
+        }
+    }
+}
+
+impl Explanation {
     /// For people.
     pub(super) fn text(&self) -> String {
         let shown = |value: &Option<toml::Value>| {

@@ -2,25 +2,28 @@
 
 mod explanation;
 
-use explanation::Explanation;
-use mackrl_run::config::{Config, ConfigBuilder, Origin, schema};
+use explanation::{Explainer, Explanation};
+use mackrl_run::config::{Origin, Resolved, Setting, schema};
 use serde::Serialize;
 
 use crate::{args::ConfigArgs, output};
 
 pub(crate) fn run(args: &ConfigArgs) -> anyhow::Result<()> {
     if args.schema {
-        return output::print_json(&schema());
+        return output::print_json(&schema(crate::registry()));
     }
-    let layers = args.configuration.layers()?;
-    let config = layers.build()?;
+    let resolved = args.configuration.layers()?.resolve()?;
     if let Some(name) = &args.explain {
         let text = format!("--explain {name}");
-        let settings = Config::settings_called(name, Origin::CommandLine { text })?;
-        let explanations = settings
-            .iter()
-            .map(|setting| Explanation::of(setting, &config, &layers))
-            .collect::<Result<Vec<_>, _>>()?;
+        let settings = crate::registry().settings_called(name, Origin::CommandLine { text })?;
+        // Settings of kinds that are not chosen are explained if nothing else was asked for.
+        let has = |setting: &Setting| resolved.config().get(&setting.key).is_some();
+        let (here, elsewhere): (Vec<_>, Vec<_>) = settings.into_iter().partition(has);
+        let settings = if here.is_empty() { elsewhere } else { here };
+        let explainer = Explainer::new(crate::registry(), &resolved)?;
+        let explanations: Vec<_> = (settings.iter())
+            .map(|setting| explainer.explain(setting))
+            .collect();
         if args.json {
             return output::print_json(&explanations);
         }
@@ -28,9 +31,9 @@ pub(crate) fn run(args: &ConfigArgs) -> anyhow::Result<()> {
         return output::print(&texts.join("\n"));
     }
     if args.json {
-        return output::print_json(&settled(&config, &layers));
+        return output::print_json(&settled(&resolved));
     }
-    output::print(&with_origins(&config, &layers))
+    output::print(&with_origins(&resolved))
 }
 
 /// A setting with its value.
@@ -42,22 +45,23 @@ struct Settled {
     origin: String,
 }
 
-fn settled(config: &Config, layers: &ConfigBuilder) -> Vec<Settled> {
-    let settings = Config::settings().into_iter();
+fn settled(resolved: &Resolved) -> Vec<Settled> {
+    let config = resolved.config();
+    let settings = config.settings().into_iter();
     settings
         .map(|setting| Settled {
             value: config.get(&setting.key),
-            origin: layers.origin(&setting.key).to_string(),
+            origin: resolved.origin(&setting.key).to_string(),
             key: setting.key,
         })
         .collect()
 }
 
 /// The configuration as TOML, with the origin of each value in a comment.
-fn with_origins(config: &Config, layers: &ConfigBuilder) -> String {
+fn with_origins(resolved: &Resolved) -> String {
     let mut text = String::new();
     let mut section = String::new();
-    for Settled { key, value, origin } in settled(config, layers) {
+    for Settled { key, value, origin } in settled(resolved) {
         let Some((table, name)) = key.split_once('.') else {
             continue;
         };
@@ -79,18 +83,19 @@ fn with_origins(config: &Config, layers: &ConfigBuilder) -> String {
 
 #[cfg(test)]
 mod tests {
+    use mackrl_run::config::ConfigBuilder;
+
     use super::*;
 
     #[test]
     fn what_is_printed_is_a_complete_configuration_file() {
-        let layers = ConfigBuilder::new()
+        let layers = ConfigBuilder::new(crate::registry())
             .preset("paper-code")
             .unwrap()
-            .flag("--map 2s3z\n", "env.map=2s3z")
-            .unwrap();
-        let config = layers.build().unwrap();
-        let printed = with_origins(&config, &layers);
-        let read = ConfigBuilder::new().file("printed", &printed).unwrap();
-        assert_eq!(read.build().unwrap(), config);
+            .map("--map 2s3z\n", "2s3z");
+        let resolved = layers.resolve().unwrap();
+        let printed = with_origins(&resolved);
+        let read = ConfigBuilder::new(crate::registry()).file("printed", &printed);
+        assert_eq!(read.unwrap().build().unwrap(), *resolved.config());
     }
 }

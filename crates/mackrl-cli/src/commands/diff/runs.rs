@@ -108,7 +108,9 @@ fn settings(a: &Config, b: &Config) -> Vec<Differing> {
             serde_json::to_value(value).unwrap_or_default()
         })
     };
-    let keys = Config::keys();
+    let of_a: Vec<String> = a.keys().collect();
+    let of_b = b.keys().filter(|key| !of_a.contains(key));
+    let keys = of_a.iter().cloned().chain(of_b);
     keys.map(|key| {
         let (a, b) = (value(a, &key), value(b, &key));
         Differing::new(key, a, b)
@@ -185,7 +187,7 @@ mod tests {
     fn settings_are_compared_key_by_key() {
         let mut other = Config::default();
         other.run.seed = 7;
-        other.env.settings.move_amount = 5.0;
+        other.env.set("move_amount", 5.0).unwrap();
         let found = settings(&Config::default(), &other);
         let names: Vec<&str> = found.iter().map(|setting| setting.name.as_str()).collect();
         assert_eq!(names, ["env.move_amount", "run.seed"]);

@@ -194,7 +194,7 @@ impl fmt::Display for MatrixGameCard {
         }
         writeln!(
             formatter,
-            "\nSettings: env.matrix_game.payoffs, .distribution and .common_knowledge; `mackrl reproduce figure5` is the paper's experiment."
+            "\nSettings: env.payoffs, env.distribution and env.common_knowledge; `mackrl reproduce figure5` is the paper's experiment."
         )
     }
 }

@@ -7,6 +7,7 @@ use std::path::Path;
 
 use anyhow::Context;
 use card::Card;
+use mackrl_env::matrix_game::MATRIX_GAME;
 use mackrl_run::config::{ConfigBuilder, ConfigError};
 use mackrl_skirmish::{Skirmish, SkirmishSettings};
 use row::Row;
@@ -48,8 +49,13 @@ fn all() -> anyhow::Result<Vec<Row>> {
 
 /// One map, with all that a person asks about it.
 fn show(name: &str, json: bool) -> anyhow::Result<()> {
-    let world = world(ConfigBuilder::new(), &format!("maps {name}"), name, &[])?;
-    if world.is_matrix_game() {
+    let world = world(
+        ConfigBuilder::new(crate::registry()),
+        &format!("maps {name}"),
+        name,
+        &[],
+    )?;
+    if world.name() == MATRIX_GAME {
         let game = card::MatrixGameCard::new(world.world()?.spec());
         return if json {
             output::print_json(&game)

@@ -5,7 +5,7 @@ mod statistics;
 
 use mackrl_env::{EpisodeKey, Stream};
 use mackrl_run::{
-    config::{ConfigBuilder, Engine, EnvironmentConfig},
+    config::{ConfigBuilder, EnvironmentConfig},
     replay::{Replay, record_script},
 };
 use report::Report;
@@ -38,7 +38,7 @@ pub(crate) fn run(args: &PlayArgs) -> anyhow::Result<()> {
         );
     };
     let key = EpisodeKey::new(args.seed, Stream::Other, 0);
-    if map.engine == Engine::Sc2 {
+    if map.is_star_craft() {
         if args.svg.is_some() {
             return Err(Failure::usage(
                 "--svg draws battles of the simulator, and StarCraft II keeps its own replays",
@@ -76,8 +76,9 @@ fn maps(args: &PlayArgs) -> anyhow::Result<Vec<EnvironmentConfig>> {
     };
     let map = |name: &str| {
         let typed = format!("--env {}", args.env);
-        let engine = ConfigBuilder::new().flag(&typed, &format!("env.engine={}", args.env))?;
-        world(engine, &format!("--map {name}"), name, &args.set)
+        let kind = ConfigBuilder::new(crate::registry());
+        let kind = kind.flag(&typed, &format!("env.name={}", args.env))?;
+        world(kind, &format!("--map {name}"), name, &args.set)
     };
     names.into_iter().map(map).collect()
 }

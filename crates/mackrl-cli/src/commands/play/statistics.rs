@@ -182,7 +182,7 @@ impl Row {
     fn new(map: &EnvironmentConfig, policy: ScriptedPolicy, seed: u64, sums: &Sums) -> Self {
         let [won, total, length, allies, enemies] = [0, 1, 2, 3, 4].map(|index| sums.mean(index));
         Self {
-            map: map.map.clone(),
+            map: map.map().to_owned(),
             policy: policy.name(),
             #[expect(
                 clippy::cast_possible_truncation,
@@ -272,7 +272,7 @@ mod tests {
 
     #[test]
     fn threads_change_no_result() {
-        let map = EnvironmentConfig::default();
+        let map = mackrl_run::config::Config::default().env;
         let play = |threads| play_many(&map, ScriptedPolicy::Random, 3, 37, threads, |_| {});
         assert_eq!(play(1).unwrap(), play(3).unwrap());
     }

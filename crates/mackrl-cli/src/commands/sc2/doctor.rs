@@ -1,8 +1,8 @@
 //! `mackrl sc2 doctor`: whether StarCraft II can be played on here, and what to do if not.
 
-use std::net::TcpListener;
+use std::{net::TcpListener, sync::Arc};
 
-use mackrl_run::config::EnvironmentConfig;
+use mackrl_run::config::{EnvironmentConfig, StarCraftKind};
 use mackrl_sc2::{
     adapter::{Game, Installation},
     protocol::{ImageData, ResponseGameInfo},
@@ -122,10 +122,8 @@ fn start(args: &DoctorArgs) -> Vec<Check> {
 }
 
 fn look(args: &DoctorArgs) -> anyhow::Result<Vec<Check>> {
-    let map = EnvironmentConfig {
-        map: args.map.clone(),
-        ..EnvironmentConfig::default()
-    };
+    let mut map = EnvironmentConfig::new(Arc::new(StarCraftKind));
+    map.set("map", args.map.as_str())?;
     let scenario = scenario(&map)?;
     let settings = settings(args.game_version.as_deref().unwrap_or_default())?;
     let mut game = Game::launch(&settings, &scenario, 1)?;

@@ -35,7 +35,7 @@ pub(crate) fn play_one(
     } = environment.battle_statistics();
     if args.json {
         return output::print_json(&serde_json::json!({
-            "map": map.map,
+            "map": map.map(),
             "policy": policy.name(),
             "seed": key.seed,
             "episode": key.episode,
@@ -48,7 +48,7 @@ pub(crate) fn play_one(
     let outcome = if battle_won { "won" } else { "not won" };
     output::print(&format!(
         "played: {} on StarCraft II by {}, {outcome} after {steps} steps, allies lost: {dead_allies}, enemies lost: {dead_enemies}\n",
-        map.map,
+        map.map(),
         policy.name()
     ))
 }

@@ -8,7 +8,7 @@ use std::{
 
 use anyhow::Context;
 use mackrl_env::{EpisodeKey, Stream};
-use mackrl_run::config::{Engine, EnvironmentConfig};
+use mackrl_run::config::{EnvironmentConfig, StarCraftKind};
 use mackrl_sc2::protocol::Unit;
 use serde_json::{Value, json};
 
@@ -26,12 +26,13 @@ pub(super) fn run(args: &RecordArgs) -> anyhow::Result<()> {
         }
         .into());
     };
-    let map = EnvironmentConfig {
-        map: args.map.clone(),
-        engine: Engine::Sc2,
-        game_version: args.game_version.clone().unwrap_or_default(),
-        ..EnvironmentConfig::default()
-    };
+    let mut map = EnvironmentConfig::new(Arc::new(StarCraftKind));
+    map.set("map", args.map.as_str())?;
+    map.set(
+        "game_version",
+        args.game_version.clone().unwrap_or_default(),
+    )?;
+    let step_mul = map.skirmish_settings()?.1.step_mul;
     let mut environment = StarCraftWorld::new(&map, 1)?.star_craft();
     let cannot = || format!("cannot write {}", args.out.display());
     let mut file = BufWriter::new(File::create(&args.out).with_context(cannot)?);
@@ -41,7 +42,7 @@ pub(super) fn run(args: &RecordArgs) -> anyhow::Result<()> {
         "map": args.map,
         "policy": policy.name(),
         "seed": args.seed,
-        "game": settings(&map.game_version)?.installation.version(),
+        "game": settings(map.text("game_version"))?.installation.version(),
         "fields": ["tag", "type", "owner", "x", "y", "facing", "health", "shield", "energy", "cooldown"],
     });
     writeln!(file, "{head}").with_context(cannot)?;
@@ -61,7 +62,7 @@ pub(super) fn run(args: &RecordArgs) -> anyhow::Result<()> {
         let steps = play::play(&mut environment, &map, policy, key)?;
         // Of an episode that was played twice because the game failed, the last loops are the good ones.
         let mut lines = lines.lock().unwrap_or_else(PoisonError::into_inner);
-        let loops = steps * usize::from(map.settings.step_mul);
+        let loops = steps * usize::from(step_mul);
         let good = lines.len().saturating_sub(loops);
         writeln!(file, "{}", json!({ "episode": episode, "steps": steps })).with_context(cannot)?;
         for line in lines.drain(..).skip(good) {

@@ -3,6 +3,7 @@
 use std::{
     io::{self, Write},
     net::SocketAddr,
+    sync::Arc,
 };
 
 use anyhow::Context;
@@ -14,7 +15,7 @@ use mackrl_sc2::{
     lifetime::end_with_parent,
     stand_in::{EpisodeRecord, GameArguments, StandIn, StandInOptions, faults::FaultPlan},
 };
-use mackrl_skirmish::UnitData;
+use mackrl_skirmish::{SkirmishKind, UnitData};
 
 use crate::{
     args::{ServeArgs, UnitsChoice},
@@ -54,11 +55,10 @@ pub(super) fn run(args: &ServeArgs) -> anyhow::Result<()> {
 
 /// What a client did, as a replay that `mackrl replay` plays.
 fn replay(record: &EpisodeRecord, units: UnitData) -> Replay {
-    let mut env = EnvironmentConfig {
-        map: record.map.clone(),
-        ..EnvironmentConfig::default()
-    };
-    env.settings.units = units;
+    let mut env = EnvironmentConfig::new(Arc::new(SkirmishKind));
+    for (name, value) in [("map", &*record.map), ("units", units.word())] {
+        env.set(name, value).expect("a map's name and a word");
+    }
     let steps = record.steps.iter().map(|(actions, hash)| Step {
         actions: actions.clone(),
         state_hash: format!("{hash:016x}"),

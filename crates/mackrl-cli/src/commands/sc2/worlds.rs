@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use mackrl::Error;
 use mackrl_env::{Counter, Environment, EnvironmentSpec, PriorKnowledge, World};
 use mackrl_run::{
-    config::{Config, Engine, EnvironmentConfig},
+    config::{Config, EnvironmentConfig},
     training::assembly,
 };
 use mackrl_sc2::adapter::{GamePool, GameSettings, Installation, StarCraft2, process::Launcher};
@@ -16,20 +16,23 @@ const PARALLEL_GAMES: usize = 8;
 
 /// The world that a run is played in.
 pub(crate) fn world(config: &Config) -> Result<assembly::World, Error> {
-    assembly::World::of(match config.env.engine {
-        Engine::Simulator => config.env.world()?,
-        Engine::Sc2 => Arc::new(StarCraftWorld::new(
-            &config.env,
-            config.learner.environments,
-        )?),
-    })
+    if !config.env.is_star_craft() {
+        return assembly::World::new(config);
+    }
+    let environments = config.algorithm.get("environments");
+    let parallel_max = environments
+        .and_then(toml::Value::as_integer)
+        .and_then(|count| usize::try_from(count).ok());
+    let parallel_max = parallel_max.unwrap_or(PARALLEL_GAMES);
+    assembly::World::of(Arc::new(StarCraftWorld::new(&config.env, parallel_max)?))
 }
 
 /// The world that `map` describes.
 pub(crate) fn world_of(map: &EnvironmentConfig) -> Result<Arc<dyn World>, Error> {
-    match map.engine {
-        Engine::Simulator => map.world(),
-        Engine::Sc2 => Ok(Arc::new(StarCraftWorld::new(map, PARALLEL_GAMES)?)),
+    if map.is_star_craft() {
+        Ok(Arc::new(StarCraftWorld::new(map, PARALLEL_GAMES)?))
+    } else {
+        map.world()
     }
 }
 
@@ -52,21 +55,18 @@ pub(super) struct StarCraftWorld {
 impl StarCraftWorld {
     /// The world that `config` describes, played in by `parallel_max` environments at once. No game is started yet.
     pub(super) fn new(config: &EnvironmentConfig, parallel_max: usize) -> Result<Self, Error> {
-        if config.settings.enemy_order != EnemyBehaviour::Map {
+        let (_, skirmish) = config.skirmish_settings()?;
+        if skirmish.enemy_order != EnemyBehaviour::Map {
             let message = "env.enemy_order is `hunt`, expected `map`: enemies in StarCraft II follow the order of their map";
             return Err(Error::Config(message.to_owned()));
         }
         let scenario = scenario(config)?;
-        let pool = Arc::new(GamePool::new(settings(&config.game_version)?));
-        let first = StarCraft2::new(
-            Arc::clone(&scenario),
-            config.settings.clone(),
-            Arc::clone(&pool),
-        )
-        .map_err(|error| Error::Config(error.to_string()))?;
+        let pool = Arc::new(GamePool::new(settings(config.text("game_version"))?));
+        let first = StarCraft2::new(Arc::clone(&scenario), skirmish.clone(), Arc::clone(&pool))
+            .map_err(|error| Error::Config(error.to_string()))?;
         Ok(Self {
             parallel_max,
-            settings: config.settings.clone(),
+            settings: skirmish,
             data: config.data(),
             version: pool.settings().installation.version(),
             spec: first.spec().clone(),
@@ -149,15 +149,16 @@ impl World for StarCraftWorld {
 /// The map, which has to be one of SMAC's: others have no file for the game.
 pub(super) fn scenario(config: &EnvironmentConfig) -> Result<Arc<Scenario>, Error> {
     let wrong = |message: String| Error::Config(message);
-    let units = UnitTypes::load(config.settings.units).map_err(|error| wrong(error.to_string()))?;
-    let shipped = Scenario::shipped(&config.map, &units).filter(|_| config.scenario.is_empty());
+    let (place, settings) = config.skirmish_settings()?;
+    let units = UnitTypes::load(settings.units).map_err(|error| wrong(error.to_string()))?;
+    let shipped = Scenario::shipped(&place.map, &units).filter(|_| place.scenario.is_empty());
     match shipped {
         Some(scenario) => Ok(Arc::new(
             scenario.map_err(|error| wrong(error.to_string()))?,
         )),
         None => Err(wrong(format!(
             "StarCraft II has no map for `{}`, expected one of {}",
-            config.map,
+            place.map,
             mackrl_skirmish::map_names().join(", ")
         ))),
     }

@@ -109,7 +109,11 @@ pub(crate) fn run(options: &AblationOptions) -> anyhow::Result<AblationReport> {
     let (map, options) = (&options.map, options.learning.resolved());
     fs::create_dir_all(&options.out)
         .with_context(|| format!("creating the folder {}", options.out.display()))?;
-    let variants = variants(&ConfigBuilder::new().preset(&options.preset)?.build()?);
+    let variants = variants(
+        &ConfigBuilder::new(crate::registry())
+            .preset(&options.preset)?
+            .build()?,
+    );
     let jobs: Vec<Job> = (variants.iter())
         .flat_map(|variant| {
             (1..=options.seeds).map(|seed| Job::new(map, variant.name, variant.settings, seed))
@@ -204,7 +208,9 @@ mod tests {
 
     /// Two runs of each variant: MACKRL ends at 0.8, number n at 0.8 − n/10, all ± 0.05.
     fn example() -> AblationReport {
-        let preset = ConfigBuilder::new().preset("paper").unwrap();
+        let preset = ConfigBuilder::new(crate::registry())
+            .preset("paper")
+            .unwrap();
         let variants = variants(&preset.build().unwrap());
         let runs: Vec<TrainingRun> = (0..variants.len())
             .flat_map(|number| {

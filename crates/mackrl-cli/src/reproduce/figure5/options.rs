@@ -1,10 +1,9 @@
 //! What `mackrl reproduce figure5` can be asked for.
 
-use std::{num::NonZeroUsize, path::PathBuf, thread};
+use std::{num::NonZeroUsize, path::PathBuf, sync::Arc, thread};
 
 use clap::{Args, ValueEnum, builder::RangedU64ValueParser};
-use mackrl_env::matrix_game::MATRIX_GAME;
-use mackrl_env::matrix_game::{MatrixGameSettings, ObservationDistribution, Payoffs};
+use mackrl_env::matrix_game::{MatrixGameKind, ObservationDistribution, Payoffs};
 use mackrl_run::config::EnvironmentConfig;
 
 use crate::provenance::{Choice, Judgement, Provenance};
@@ -97,15 +96,16 @@ impl Figure5Options {
     /// Where a report comes from. Its configuration is the command without the seed.
     #[must_use]
     pub(crate) fn provenance(&self) -> Provenance {
-        let env = EnvironmentConfig {
-            map: MATRIX_GAME.to_owned(),
-            matrix_game: MatrixGameSettings {
-                payoffs: self.payoffs.into(),
-                distribution: self.observation.into(),
-                ..MatrixGameSettings::default()
-            },
-            ..EnvironmentConfig::default()
-        };
+        let mut env = EnvironmentConfig::new(Arc::new(MatrixGameKind));
+        for (name, word) in [
+            ("payoffs", Payoffs::from(self.payoffs).word()),
+            (
+                "distribution",
+                ObservationDistribution::from(self.observation).word(),
+            ),
+        ] {
+            env.set(name, word).expect("a word that the game takes");
+        }
         let command = self.command();
         let settings = command.rsplit_once(" --seed ").map_or("", |(rest, _)| rest);
         let judgement = Judgement {

@@ -67,7 +67,7 @@ impl Job {
 
     /// A run of `learner`.
     pub(crate) fn of_learner(map: &str, learner: Learner, seed: u64) -> Self {
-        let algorithm = format!("policy.algorithm={}", learner.setting());
+        let algorithm = format!("algorithm.name={}", learner.setting());
         Self::new(map, learner.setting(), &[&algorithm], seed)
     }
 
@@ -126,13 +126,14 @@ impl Job {
             steps, interval, ..
         } = options;
         let common = [
-            format!("env.map={}", self.map),
             format!("run.seed={}", self.seed),
             format!("run.steps_env={steps}"),
             format!("run.metrics_interval_steps_env={interval}"),
             format!("test.interval_steps_env={interval}"),
         ];
-        let preset = ConfigBuilder::new().preset(&options.preset)?;
+        let preset = ConfigBuilder::new(crate::registry())
+            .preset(&options.preset)?
+            .map(&format!("--map {}", self.map), &self.map);
         let builder = (common.iter().chain(&self.settings))
             .try_fold(preset, |builder, setting| builder.set(setting))?;
         Ok(builder.build()?)

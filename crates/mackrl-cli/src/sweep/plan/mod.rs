@@ -10,11 +10,11 @@ use std::{
 };
 
 use mackrl_run::config::{
-    Config, ConfigBuilder, ConfigError, Leaf, Origin, line_and_column, parse_document,
+    Config, ConfigBuilder, ConfigError, Leaf, Origin, Registry, line_and_column, parse_document,
 };
 use serde::{Deserialize, de::IgnoredAny};
 
-use crate::{args::with_scenario, bounded, recorded::setting, sweep::Entry};
+use crate::{args::with_scenario, bounded, sweep::Entry};
 
 /// Longest plan that is read, in bytes.
 const LENGTH_MAX: usize = 1 << 20;
@@ -25,7 +25,7 @@ const NAME_MAX: usize = 60;
 /// Settings that are given by lists of their own.
 const LISTED: [(&str, &str); 3] = [
     ("env.map", "maps"),
-    ("policy.algorithm", "algorithms"),
+    ("algorithm.name", "algorithms"),
     ("run.seed", "seeds"),
 ];
 
@@ -162,8 +162,8 @@ impl Reading<'_> {
         let mut entries = Vec::with_capacity(count);
         for map in maps {
             for algorithm in algorithms {
-                let builder = self.assign(base.clone(), "maps", "env.map", map)?;
-                let builder = self.assign(builder, "algorithms", "policy.algorithm", algorithm)?;
+                let builder = base.clone().map_at(self.origin_of("maps"), map);
+                let builder = self.assign(builder, "algorithms", "algorithm.name", algorithm)?;
                 for kind in &kinds {
                     entries.extend(self.repetitions(builder.clone(), kind, &seeds, out)?);
                 }
@@ -211,7 +211,7 @@ impl Reading<'_> {
 
     /// What all runs have in common.
     fn base(&self) -> anyhow::Result<ConfigBuilder> {
-        let builder = ConfigBuilder::new()
+        let builder = ConfigBuilder::new(&Registry::built_in())
             .preset(&self.document.preset)
             .map_err(|error| self.error("preset", error.to_string()))?;
         let builder = lay(builder, &self.settings_in(&["settings"]))?;
@@ -313,8 +313,8 @@ fn lay(builder: ConfigBuilder, settings: &[Setting]) -> anyhow::Result<ConfigBui
 /// Refuses settings that lists of their own would replace.
 fn refuse(builder: &ConfigBuilder, listed: &[(&str, &str)]) -> anyhow::Result<()> {
     for (key, list) in listed {
-        let origin = builder.origin(key);
-        if matches!(origin, Origin::File { .. }) {
+        if let Some(origin @ Origin::File { .. }) = builder.written(key) {
+            let origin = origin.clone();
             let message = format!("`{key}` is given by `{list}`");
             return Err(ConfigError::Syntax { origin, message }.into());
         }
@@ -355,10 +355,10 @@ fn multiplied(kinds: &[Kind], varied: &Setting) -> anyhow::Result<Vec<Kind>> {
 
 /// Map, algorithm, kind and seed.
 fn name(config: &Config, kind: &Kind) -> String {
-    let map = Path::new(&config.env.map).file_stem().unwrap_or_default();
+    let map = Path::new(config.env.map()).file_stem().unwrap_or_default();
     let mut parts = vec![
         plain(&map.to_string_lossy()),
-        plain(&setting(config, "policy.algorithm")),
+        plain(config.algorithm.name()),
     ];
     parts.extend(kind.names.iter().cloned());
     parts.push(format!("seed{}", config.run.seed));

@@ -37,13 +37,13 @@ fn every_combination_of_map_algorithm_and_seed_is_a_run() {
         (last.config.run.steps_env, last.config.test.episodes),
         (1000, 7)
     );
-    assert_eq!((&*last.config.env.map, last.config.run.seed), ("2s3z", 2));
+    assert_eq!((last.config.env.map(), last.config.run.seed), ("2s3z", 2));
 }
 
 #[test]
 fn lists_multiply_and_variants_have_settings_of_their_own() {
-    let text = "maps = [\"3m\"]\nseeds = [5]\n[vary]\nlearner.gamma = [0.5, 1.0]\n\
-                [variants.full]\n[variants.alone]\npolicy.algorithm = \"central-v\"\n";
+    let text = "maps = [\"3m\"]\nseeds = [5]\n[vary]\nalgorithm.gamma = [0.5, 1.0]\n\
+                [variants.full]\n[variants.alone]\nalgorithm.name = \"central-v\"\n";
     let expected = [
         "3m-central-v-alone-gamma-0.5-seed5",
         "3m-central-v-alone-gamma-1.0-seed5",
@@ -51,7 +51,12 @@ fn lists_multiply_and_variants_have_settings_of_their_own() {
         "3m-mackrl-full-gamma-1.0-seed5",
     ];
     assert_eq!(names(text), expected);
-    assert_eq!(parse(text).unwrap().entries[0].config.learner.gamma, 0.5);
+    assert_eq!(
+        parse(text).unwrap().entries[0]
+            .config
+            .get("algorithm.gamma"),
+        Some(0.5.into())
+    );
 }
 
 #[test]
@@ -82,27 +87,27 @@ fn errors_name_line_and_column() {
             "plan.toml:3:10: unknown preset",
         ),
         (
-            "maps = [\"3m\"]\nseeds = 1\n[settings]\nlearner.gama = 1\n",
-            "plan.toml:4:16: unknown key `learner.gama`, did you mean `learner.gamma`?",
+            "maps = [\"3m\"]\nseeds = 1\n[settings]\nalgorithm.gama = 1\n",
+            "plan.toml:4:1: unknown key `algorithm.gama`, did you mean `algorithm.gamma`?",
         ),
         (
-            "maps = [\"3m\"]\nseeds = 1\n[settings]\nlearner.gamma = 7.0\n",
-            "plan.toml:4:17: `learner.gamma` is 7.0",
+            "maps = [\"3m\"]\nseeds = 1\n[settings]\nalgorithm.gamma = 7.0\n",
+            "plan.toml:4:19: `algorithm.gamma` is 7.0",
         ),
         (
             "maps = [\"3m\"]\nseeds = 1\n[settings]\nrun.seed = 7\n",
             "plan.toml:4:12: `run.seed` is given by `seeds`",
         ),
         (
-            "maps = [\"3m\"]\nseeds = 1\n[vary]\nlearner.gamma = 0.5\n",
-            "plan.toml:4:17: `learner.gamma` is 0.5, expected a list",
+            "maps = [\"3m\"]\nseeds = 1\n[vary]\nalgorithm.gamma = 0.5\n",
+            "plan.toml:4:19: `algorithm.gamma` is 0.5, expected a list",
         ),
         (
             "maps = [\"3m\"]\nseeds = [1, 1]\n",
             "plan.toml:1:8: two runs would be called 3m-mackrl-seed1",
         ),
         (
-            "maps = [\"3m\"]\nseeds = 1\n[variants.\"../x\"]\nlearner.gamma = 0.5\n",
+            "maps = [\"3m\"]\nseeds = 1\n[variants.\"../x\"]\nalgorithm.gamma = 0.5\n",
             "plan.toml:4:17: `../x` is not a name",
         ),
         ("maps = [\"3m\"\n", "plan.toml:"),
@@ -120,7 +125,7 @@ fn a_plan_cannot_ask_for_more_runs_than_anybody_wants() {
         .map(|n| format!("{:.3}", f64::from(n) / 100.0))
         .collect();
     let text = format!(
-        "maps = [\"3m\"]\nseeds = [{}]\n[vary]\nlearner.gamma = [{}]\n",
+        "maps = [\"3m\"]\nseeds = [{}]\n[vary]\nalgorithm.gamma = [{}]\n",
         seeds.join(", "),
         gammas.join(", ")
     );

@@ -1,121 +1,129 @@
-use mackrl_env::matrix_game::Payoffs;
+use mackrl::algorithms::CentralV;
+use mackrl_env::matrix_game::{Payoffs, payoff_text};
+use mackrl_skirmish::SKIRMISH;
 use proptest::prelude::*;
 
 use super::*;
-use crate::config::{Algorithm, CommonKnowledgeFeatures, OptimiserKind, PartitionChoice};
+use crate::config::{AlgorithmConfig, STAR_CRAFT};
 
-fn file(text: &str) -> Result<ConfigBuilder, ConfigError> {
-    ConfigBuilder::new().file("run.toml", text)
+fn builder() -> ConfigBuilder {
+    ConfigBuilder::new(&Registry::built_in())
 }
 
-fn message(result: Result<impl std::fmt::Debug, ConfigError>) -> String {
-    result.unwrap_err().to_string()
+fn file(text: &str) -> Result<ConfigBuilder, ConfigError> {
+    builder().file("run.toml", text)
+}
+
+/// What is said of these layers.
+fn message(layers: Result<ConfigBuilder, ConfigError>) -> String {
+    let built = layers.and_then(|builder| builder.build());
+    built.unwrap_err().to_string()
+}
+
+fn float(value: f64) -> Option<toml::Value> {
+    Some(toml::Value::Float(value))
+}
+
+fn text_value(value: &str) -> Option<toml::Value> {
+    Some(value.into())
 }
 
 #[test]
 fn later_layers_win_over_earlier_ones() {
-    let builder = ConfigBuilder::new()
+    let builder = builder()
         .preset("paper-code")
         .unwrap()
         .file(
             "run.toml",
-            "[learner]\noptimiser = \"adam\"\nlambda = 0.7\n",
+            "[algorithm]\noptimiser = \"adam\"\nlambda = 0.7\n",
         )
         .unwrap()
-        .set("learner.lambda=0.6")
+        .set("algorithm.lambda=0.6")
         .unwrap();
-    let config = builder.build().unwrap();
+    let resolved = builder.resolve().unwrap();
+    let config = resolved.config();
+    assert_eq!(config.get("algorithm.common_knowledge"), text_value("thin"));
+    assert_eq!(config.get("algorithm.optimiser"), text_value("adam"));
+    assert_eq!(config.get("algorithm.lambda"), float(0.6));
     assert_eq!(
-        config.policy.common_knowledge,
-        CommonKnowledgeFeatures::Thin
-    );
-    assert_eq!(config.learner.optimiser, OptimiserKind::Adam);
-    assert_eq!(config.learner.lambda, 0.6);
-    assert_eq!(
-        builder.origin("learner.optimiser").to_string(),
+        resolved.origin("algorithm.optimiser").to_string(),
         "run.toml:2:13"
     );
     assert_eq!(
-        builder.origin("learner.lambda").to_string(),
-        "--set learner.lambda=0.6"
+        resolved.origin("algorithm.lambda").to_string(),
+        "--set algorithm.lambda=0.6"
     );
 }
 
 #[test]
 fn an_unknown_key_is_named_with_its_place_and_its_neighbour() {
     assert_eq!(
-        message(file("[learner]\ngamma = 0.9\ngama = 0.9\n")),
-        "run.toml:3:1: unknown key `learner.gama`, did you mean `learner.gamma`?"
+        message(file("[algorithm]\ngamma = 0.9\ngama = 0.9\n")),
+        "run.toml:3:1: unknown key `algorithm.gama`, did you mean `algorithm.gamma`?"
     );
     assert_eq!(
-        message(ConfigBuilder::new().set("gamma=0.9")),
-        "--set gamma=0.9: unknown key `gamma`, did you mean `learner.gamma`?"
+        message(builder().set("gamma=0.9")),
+        "--set gamma=0.9: unknown key `gamma`, did you mean `algorithm.gamma`?"
     );
     assert_eq!(
         message(file("colour = 3")),
         "run.toml:1:1: unknown key `colour`"
     );
     assert_eq!(
-        message(file("[learner.gamma]\nstart = 0.9")),
-        "run.toml:2:1: unknown key `learner.gamma.start`, did you mean `exploration.start`?"
+        message(file("[algorithm.gamma]\nstart = 0.9")),
+        "run.toml:2:1: unknown key `algorithm.gamma.start`, did you mean `algorithm.gamma`?"
     );
 }
 
 #[test]
 fn a_wrong_type_is_named_with_its_place_and_what_was_expected() {
     assert_eq!(
-        message(file("[learner]\ngamma = \"high\"\n")),
-        "run.toml:2:9: `learner.gamma` is \"high\", expected a number in [0, 1]"
+        message(file("[algorithm]\ngamma = \"high\"\n")),
+        "run.toml:2:9: `algorithm.gamma` is \"high\", expected a number in [0, 1]"
     );
     assert_eq!(
-        message(file("learner = 3\n")),
-        "run.toml:1:11: `learner` is 3, expected a table of settings"
+        message(file("algorithm = 3\n")),
+        "run.toml:1:13: `algorithm` is 3, expected a table of settings"
     );
     assert_eq!(
-        message(file("[policy]\nalgorithm = \"qmix\"\n")),
-        "run.toml:2:13: `policy.algorithm` is \"qmix\", expected `mackrl` or `central-v`"
+        message(file("[algorithm]\nname = \"qmix\"\n")),
+        "run.toml:2:8: `algorithm.name` is \"qmix\", expected `mackrl` or `central-v`"
     );
     assert_eq!(
-        message(ConfigBuilder::new().set("run.seed=-1")),
+        message(builder().set("run.seed=-1")),
         "--set run.seed=-1: `run.seed` is -1, expected an integer in [0, 2^53]"
     );
 }
 
 #[test]
 fn a_value_out_of_range_is_named_with_its_place() {
-    let built = |text: &str| file(text).unwrap().build();
     assert_eq!(
-        message(built("[learner]\ngamma = 1.5\n")),
-        "run.toml:2:9: `learner.gamma` is 1.5, expected a number in [0, 1]"
+        message(file("[algorithm]\ngamma = 1.5\n")),
+        "run.toml:2:9: `algorithm.gamma` is 1.5, expected a number in [0, 1]"
     );
     assert_eq!(
-        message(built("learner.learning_rate = nan")),
-        "run.toml:1:25: `learner.learning_rate` is nan, expected a number in (0, 1]"
+        message(file("algorithm.learning_rate = nan")),
+        "run.toml:1:27: `algorithm.learning_rate` is nan, expected a number in (0, 1]"
     );
     assert_eq!(
-        message(built("exploration.finish = 0.9")),
-        "run.toml:1:22: `exploration.finish` is 0.9, expected at most 0.5, which is exploration.start"
+        message(file("algorithm.exploration_finish = 0.9")),
+        "run.toml:1:32: `algorithm.exploration_finish` is 0.9, expected at most 0.5, which is algorithm.exploration_start"
     );
 }
 
 #[test]
 fn a_file_that_is_not_toml_is_named_with_line_and_column() {
-    assert!(message(file("[learner]\ngamma 0.9\n")).starts_with("run.toml:2:7: "));
+    assert!(message(file("[algorithm]\ngamma 0.9\n")).starts_with("run.toml:2:7: "));
     assert_eq!(
-        message(ConfigBuilder::new().set("learner.gamma")),
-        "--set learner.gamma: expected key=value"
+        message(builder().set("algorithm.gamma")),
+        "--set algorithm.gamma: expected key=value"
     );
 }
 
 #[test]
 fn a_short_flag_is_named_as_it_was_typed() {
     assert_eq!(
-        message(
-            ConfigBuilder::new()
-                .flag("--steps 0", "run.steps_env=0")
-                .unwrap()
-                .build()
-        ),
+        message(builder().flag("--steps 0", "run.steps_env=0")),
         "--steps 0: `run.steps_env` is 0, expected an integer in [1, 2^53]"
     );
 }
@@ -123,43 +131,165 @@ fn a_short_flag_is_named_as_it_was_typed() {
 #[test]
 fn a_preset_that_is_not_shipped_names_its_neighbour() {
     assert_eq!(
-        message(ConfigBuilder::new().preset("papers")),
-        "unknown preset `papers`, expected default, paper, paper-code, did you mean `paper`?"
+        message(builder().preset("papers")),
+        "unknown preset `papers`, expected default, fours, paper, paper-code, did you mean `paper`?"
     );
 }
 
 #[test]
 fn settings_of_the_map_reach_it() {
-    let config = ConfigBuilder::new()
-        .set("env.move_amount=5")
-        .unwrap()
-        .build()
-        .unwrap();
-    assert_eq!(config.env.settings.move_amount, 5.0);
-    let config = ConfigBuilder::new()
-        .set("env.matrix_game.common_knowledge=0.25")
-        .unwrap()
-        .set("env.matrix_game.payoffs=printed")
-        .unwrap()
-        .build()
-        .unwrap();
-    assert_eq!(config.env.matrix_game.common_knowledge, 0.25);
-    assert_eq!(config.env.matrix_game.payoffs, Payoffs::Printed);
+    let config = Config::with(&["env.move_amount=5"]).unwrap();
+    let (_, settings) = config.env.skirmish_settings().unwrap();
+    assert_eq!(settings.move_amount, 5.0);
+    let config = Config::with(&[
+        "env.name=matrix-game",
+        "env.common_knowledge=0.25",
+        "env.payoffs=printed",
+    ])
+    .unwrap();
+    assert_eq!(config.get("env.common_knowledge"), float(0.25));
+    assert_eq!(config.env.data(), payoff_text(Payoffs::Printed));
     assert_eq!(
         message(
-            ConfigBuilder::new()
-                .set("env.matrix_game.common_knowledge=1.5")
-                .unwrap()
-                .build()
+            builder()
+                .map("--map matrix-game", "matrix-game")
+                .set("env.common_knowledge=1.5")
         ),
-        "--set env.matrix_game.common_knowledge=1.5: `env.matrix_game.common_knowledge` is 1.5, expected a number in [0, 1]"
+        "--set env.common_knowledge=1.5: `env.common_knowledge` is 1.5, expected a number in [0, 1]"
     );
+}
+
+#[test]
+fn a_map_is_chosen_by_its_name_and_so_is_a_world_without_maps() {
+    let chosen = |layers: ConfigBuilder| {
+        let config = layers.build().unwrap();
+        let (kind, map) = (config.env.name().to_owned(), config.env.map().to_owned());
+        (kind, map)
+    };
+    let of = |kind: &str, map: &str| (kind.to_owned(), map.to_owned());
+    assert_eq!(chosen(builder().map("--map 8m", "8m")), of(SKIRMISH, "8m"));
+    let game = builder().map("--map matrix-game", "matrix-game");
+    assert_eq!(chosen(game.clone()), of("matrix-game", "matrix-game"));
+    assert_eq!(
+        chosen(game.map("--map 2s3z", "2s3z")),
+        of(SKIRMISH, "2s3z"),
+        "a later map brings its kind along"
+    );
+    let real = builder().set("env.name=sc2").unwrap();
+    assert_eq!(
+        chosen(real.map("--map 2s3z", "2s3z")),
+        of(STAR_CRAFT, "2s3z"),
+        "a kind that has maps stays"
+    );
+    assert_eq!(
+        message(builder().set("env.map=matrix-game")),
+        "--set env.map=matrix-game: `env.map` is \"matrix-game\", expected a map; a kind of world is chosen by env.name = \"matrix-game\""
+    );
+}
+
+#[test]
+fn a_setting_of_a_kind_that_is_not_chosen_is_named_with_its_owner() {
+    assert_eq!(
+        message(file("[env]\nname = \"matrix-game\"\nmove_amount = 3.0\n")),
+        "run.toml:3:1: `env.move_amount` is a setting of `skirmish`, but `env.name` is `matrix-game`"
+    );
+    assert_eq!(
+        message(file(
+            "[algorithm]\nname = \"central-v\"\npartitions = \"all\"\n"
+        )),
+        "run.toml:3:1: `algorithm.partitions` is a setting of `mackrl`, but `algorithm.name` is `central-v`"
+    );
+}
+
+#[test]
+fn a_table_for_a_kind_holds_for_that_kind_alone_and_is_checked_for_any() {
+    let text = "[env.skirmish]\nmove_amount = 3\n[env.sc2]\ngame_version = \"4.10\"\n\
+                [env.matrix-game]\npayoffs = \"printed\"\n[algorithm.mackrl]\npartitions = \"round-robin\"\n";
+    let value = |settings: &[&str], key: &str| {
+        let layers = settings
+            .iter()
+            .try_fold(file(text).unwrap(), |builder, one| builder.set(one));
+        layers.unwrap().build().unwrap().get(key)
+    };
+    assert_eq!(value(&[], "env.move_amount"), float(3.0));
+    assert_eq!(value(&[], "env.payoffs"), None);
+    assert_eq!(
+        value(&["env.name=sc2"], "env.move_amount"),
+        float(3.0),
+        "the game plays by the settings of the simulator"
+    );
+    assert_eq!(
+        value(&["env.name=sc2"], "env.game_version"),
+        text_value("4.10")
+    );
+    assert_eq!(
+        value(&["env.name=matrix-game"], "env.payoffs"),
+        text_value("printed")
+    );
+    assert_eq!(
+        value(&["algorithm.name=central-v"], "algorithm.partitions"),
+        None
+    );
+    assert_eq!(
+        message(file("[env.matrix-game]\npayofs = \"printed\"")),
+        "run.toml:2:1: unknown key `env.matrix-game.payofs`, did you mean `env.matrix-game.payoffs`?"
+    );
+    assert_eq!(
+        message(file("[env.matrix-game]\npayoffs = \"paper\"")),
+        "run.toml:2:11: `env.matrix-game.payoffs` is \"paper\", expected `coded` or `printed`"
+    );
+}
+
+#[test]
+fn a_key_of_version_0_1_0_is_named_with_its_name_now() {
+    for (key, new) in [
+        ("learner.gamma", "algorithm.gamma"),
+        ("policy.algorithm", "algorithm.name"),
+        ("policy.partitions", "algorithm.partitions"),
+        ("exploration.steps_env", "algorithm.exploration_steps_env"),
+        ("env.engine", "env.name"),
+        ("env.matrix_game.payoffs", "env.payoffs"),
+    ] {
+        assert_eq!(
+            message(builder().set(&format!("{key}=1"))),
+            format!("--set {key}=1: `{key}` is called `{new}` now")
+        );
+    }
+}
+
+/// What 0.1.0 wrote for `--map MAP` and the algorithm, with the settings of the paper's code.
+fn recorded(map: &str, algorithm: &str) -> Config {
+    let text = include_str!("recorded-0.1.0.toml")
+        .replace("\"3m\"", &format!("{map:?}"))
+        .replace(
+            "algorithm = \"mackrl\"",
+            &format!("algorithm = {algorithm:?}"),
+        );
+    let layers = builder().recorded("config.toml", &text).unwrap();
+    layers.build().unwrap()
+}
+
+#[test]
+fn what_version_0_1_0_recorded_is_read_as_it_was_meant() {
+    for (map, algorithm) in [("2s3z", "mackrl"), ("3m", "central-v")] {
+        let expected = builder()
+            .preset("paper-code")
+            .unwrap()
+            .map("--map", map)
+            .set(&format!("algorithm.name={algorithm}"))
+            .unwrap();
+        assert_eq!(recorded(map, algorithm), expected.build().unwrap());
+    }
+    let game = recorded("matrix-game", "mackrl");
+    assert_eq!(game.env.name(), "matrix-game");
+    assert_eq!(game.get("env.common_knowledge"), float(0.5));
+    assert_eq!(game.get("env.move_amount"), None);
 }
 
 #[test]
 fn a_setting_of_the_map_that_is_wrong_is_named_like_any_other() {
     assert_eq!(
-        message(ConfigBuilder::new().set("env.move_amont=5")),
+        message(builder().set("env.move_amont=5")),
         "--set env.move_amont=5: unknown key `env.move_amont`, did you mean `env.move_amount`?"
     );
     assert_eq!(
@@ -167,43 +297,39 @@ fn a_setting_of_the_map_that_is_wrong_is_named_like_any_other() {
         "run.toml:2:15: `env.move_amount` is \"far\", expected a number in (0, 32]"
     );
     assert_eq!(
-        message(file("[env]\nmove_amount = 99.0\n").unwrap().build()),
+        message(file("[env]\nmove_amount = 99.0\n")),
         "run.toml:2:15: `env.move_amount` is 99.0, expected a number in (0, 32]"
     );
     assert_eq!(
-        message(ConfigBuilder::new().set("env.units=paper")),
+        message(builder().set("env.units=paper")),
         "--set env.units=paper: `env.units` is \"paper\", expected `liberty` or `lotv`"
     );
     assert_eq!(
-        message(file("[env]\nshoot_range = 9.0\n").unwrap().build()),
-        "run.toml:2:15: `env.shoot_range` is 9.0, expected less than 9.0, which is env.sight_range: agents can only aim at what they see"
+        message(file("[env]\nshoot_range = 9.0\n")),
+        "run.toml:2:15: `env.shoot_range` is 9.0, expected less than 9.0, which is sight_range: agents can only aim at what they see"
     );
     assert_eq!(
-        message(
-            ConfigBuilder::new()
-                .set("env.sight_range=6.0")
-                .unwrap()
-                .build()
-        ),
-        "--set env.sight_range=6.0: `env.sight_range` is 6.0, expected more than 6.0, which is env.shoot_range: agents can only aim at what they see",
+        message(builder().set("env.sight_range=6.0")),
+        "--set env.sight_range=6.0: `env.sight_range` is 6.0, expected more than 6.0, which is shoot_range: agents can only aim at what they see",
         "the value that was written later is named"
     );
 }
 
 #[test]
 fn a_team_without_the_partitions_that_are_asked_for_is_named_with_its_place() {
-    let large = file("[env]\nmap = \"27m_vs_30m\"\n[policy]\npartitions = \"all\"\n").unwrap();
+    let large =
+        file("[env]\nmap = \"27m_vs_30m\"\n[algorithm.mackrl]\npartitions = \"all\"\n").unwrap();
     assert_eq!(
-        message(large.build()),
-        "run.toml:4:14: `policy.partitions` is \"all\", expected `round-robin` or `sampled:K` for the 27 agents of 27m_vs_30m"
+        message(Ok(large.clone())),
+        "run.toml:4:14: `algorithm.partitions` is \"all\", expected `round-robin` or `sampled:K` for the 27 agents of 27m_vs_30m"
     );
     assert_eq!(
-        large.build_environment().unwrap().map,
+        large.build_environment().unwrap().map(),
         "27m_vs_30m",
         "the world alone can be had"
     );
     large
-        .set("policy.algorithm=central-v")
+        .set("algorithm.name=central-v")
         .unwrap()
         .build()
         .unwrap();
@@ -212,17 +338,9 @@ fn a_team_without_the_partitions_that_are_asked_for_is_named_with_its_place() {
 #[test]
 fn an_unknown_map_is_named_with_its_place_and_its_neighbour() {
     assert_eq!(
-        message(file("env.map = \"2s3x\"").unwrap().build()),
+        message(file("env.map = \"2s3x\"")),
         "run.toml:1:11: unknown map `2s3x`, did you mean `2s3z`?"
     );
-}
-
-/// Choices that every team has.
-fn choice() -> impl Strategy<Value = PartitionChoice> {
-    prop_oneof![
-        Just(PartitionChoice::RoundRobin),
-        Just(PartitionChoice::Sampled(1)),
-    ]
 }
 
 prop_compose! {
@@ -230,25 +348,34 @@ prop_compose! {
         (gamma, lambda, rate, critic_rate) in (0.0..=1.0f64, 0.0..=1.0f64, 1e-9..=1.0f64, 1e-9..=1.0f64),
         (start, share) in (0.0..=1.0f64, 0.0..=1.0f64),
         (steps_env, seed) in (1u64..=1 << 53, 0u64..=1 << 53),
-        (partitions, thin, central_v, rmsprop) in (choice(), any::<bool>(), any::<bool>(), any::<bool>()),
+        // Choices that every team has.
+        partitions in prop::sample::select(&["round-robin", "sampled:1"][..]),
+        (thin, central_v, rmsprop) in (any::<bool>(), any::<bool>(), any::<bool>()),
         map in prop::sample::select(mackrl_skirmish::map_names()),
-        move_amount in 0.1f32..=32.0,
+        move_amount in 0.1f64..=32.0,
     ) -> Config {
         let mut config = Config::default();
-        config.learner.gamma = gamma;
-        config.learner.lambda = lambda;
-        config.learner.learning_rate = rate;
-        config.learner.critic_learning_rate = critic_rate;
-        config.exploration.start = start;
-        config.exploration.finish = start * share;
+        if central_v {
+            config.algorithm = AlgorithmConfig::new(Arc::new(CentralV));
+        } else {
+            config.algorithm.set("partitions", partitions).unwrap();
+            if thin { config.algorithm.set("common_knowledge", "thin").unwrap(); }
+        }
+        for (name, value) in [
+            ("gamma", gamma),
+            ("lambda", lambda),
+            ("learning_rate", rate),
+            ("critic_learning_rate", critic_rate),
+            ("exploration_start", start),
+            ("exploration_finish", start * share),
+        ] {
+            config.algorithm.set(name, value).unwrap();
+        }
+        if rmsprop { config.algorithm.set("optimiser", "rmsprop").unwrap(); }
         config.run.steps_env = steps_env;
         config.run.seed = seed;
-        config.policy.partitions = partitions;
-        if thin { config.policy.common_knowledge = CommonKnowledgeFeatures::Thin; }
-        if central_v { config.policy.algorithm = Algorithm::CentralV; }
-        if rmsprop { config.learner.optimiser = OptimiserKind::Rmsprop; }
-        config.env.map = map.to_owned();
-        config.env.settings.move_amount = move_amount;
+        config.env.set("map", map).unwrap();
+        config.env.set("move_amount", move_amount).unwrap();
         config
     }
 }
@@ -268,7 +395,7 @@ proptest! {
         if let Ok(builder) = file(&text) {
             let _ = builder.build();
         }
-        if let Ok(builder) = ConfigBuilder::new().set(&text) {
+        if let Ok(builder) = builder().set(&text) {
             let _ = builder.build();
         }
     }
@@ -277,27 +404,28 @@ proptest! {
 #[test]
 fn large_teams_take_turns_unless_something_else_is_asked_for() {
     let partitions = |settings: &[&str]| {
-        let builder = ConfigBuilder::new().preset("paper").unwrap();
+        let builder = builder().preset("paper").unwrap();
         let builder = (settings.iter()).try_fold(builder, |builder, setting| builder.set(setting));
         let builder = builder.unwrap();
-        let origin = builder.origin("policy.partitions").to_string();
-        (builder.build().unwrap().policy.partitions, origin)
+        let resolved = builder.resolve().unwrap();
+        let origin = resolved.origin("algorithm.partitions").to_string();
+        (resolved.config().get("algorithm.partitions"), origin)
     };
     let (large, origin) = partitions(&["env.map=27m_vs_30m"]);
-    assert_eq!(large, PartitionChoice::RoundRobin);
+    assert_eq!(large, text_value("round-robin"));
     assert!(origin.starts_with("automatic: "), "{origin}");
     let (small, origin) = partitions(&["env.map=8m"]);
-    assert_eq!(small, PartitionChoice::All);
+    assert_eq!(small, text_value("all"));
     assert!(origin.starts_with("preset paper:"), "{origin}");
-    let asked = partitions(&["env.map=10m_vs_11m", "policy.partitions=sampled:5"]).0;
-    assert_eq!(asked, PartitionChoice::Sampled(5));
-    let too_many = ConfigBuilder::new()
+    let asked = partitions(&["env.map=10m_vs_11m", "algorithm.partitions=sampled:5"]).0;
+    assert_eq!(asked, text_value("sampled:5"));
+    let too_many = builder()
         .set("env.map=10m_vs_11m")
-        .and_then(|builder| builder.set("policy.partitions=all"))
+        .and_then(|builder| builder.set("algorithm.partitions=all"))
         .unwrap();
     assert!(
         too_many.build().is_err(),
-        "whoever asks for all is told why not"
+        "a user who asks for all is told why not"
     );
 }
 
@@ -305,6 +433,9 @@ fn large_teams_take_turns_unless_something_else_is_asked_for() {
 fn numbers_of_single_precision_read_as_they_are_written() {
     let scatter = Config::default().get("env.spawn_scatter");
     assert_eq!(scatter, Some(toml::Value::Float(0.02)));
-    let set = ConfigBuilder::new().set("env.spawn_scatter=0.3").unwrap();
-    assert_eq!(set.build().unwrap().env.settings.spawn_scatter, 0.3);
+    let set = builder().set("env.spawn_scatter=0.3").unwrap();
+    let config = set.build().unwrap();
+    assert_eq!(config.get("env.spawn_scatter"), float(0.3));
+    let (_, settings) = config.env.skirmish_settings().unwrap();
+    assert_eq!(settings.spawn_scatter, 0.3);
 }

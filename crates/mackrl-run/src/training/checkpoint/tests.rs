@@ -1,21 +1,22 @@
 use super::*;
 use crate::{
-    config::{Algorithm, Config},
+    config::Config,
     training::{MetricRow, Trainer},
 };
 
-fn config(algorithm: Algorithm) -> Config {
-    let mut config = Config::default();
-    config.policy.algorithm = algorithm;
-    config.policy.hidden = 5;
-    config.learner.environments = 7;
-    config.learner.target_interval_updates = 13;
-    config.exploration.steps_env = 1_009;
-    config.test.interval_steps_env = 701;
-    config.test.episodes = 3;
-    config.run.metrics_interval_steps_env = 307;
-    config.run.steps_env = 2_003;
-    config
+fn config(algorithm: &str) -> Config {
+    let settings = [
+        &format!("algorithm.name={algorithm}"),
+        "algorithm.hidden=5",
+        "algorithm.environments=7",
+        "algorithm.target_interval_updates=13",
+        "algorithm.exploration_steps_env=1009",
+        "test.interval_steps_env=701",
+        "test.episodes=3",
+        "run.metrics_interval_steps_env=307",
+        "run.steps_env=2003",
+    ];
+    Config::with(&settings).unwrap()
 }
 
 /// Rows as bytes, without what depends on the clock.
@@ -45,14 +46,14 @@ fn train(config: &Config, threads: &[usize], pause: u64) -> (Vec<String>, Checkp
 
 #[test]
 fn an_interrupted_run_equals_an_uninterrupted_one_on_any_number_of_threads() {
-    for algorithm in [Algorithm::Mackrl, Algorithm::CentralV] {
+    for algorithm in ["mackrl", "central-v"] {
         let config = config(algorithm);
         let whole = train(&config, &[1], u64::MAX);
         assert!(whole.0.len() > 5, "tests and rows: {}", whole.0.len());
         for (threads, pause) in [([1, 1], 1), ([2, 1], 2), ([1, 3], 3)] {
             assert!(
                 train(&config, &threads, pause) == whole,
-                "{algorithm:?} on {threads:?} threads, interrupted every {pause} iterations"
+                "{algorithm} on {threads:?} threads, interrupted every {pause} iterations"
             );
         }
     }
@@ -60,13 +61,13 @@ fn an_interrupted_run_equals_an_uninterrupted_one_on_any_number_of_threads() {
 
 #[test]
 fn rmsprop_resumes_as_well() {
-    let mut config = config(Algorithm::CentralV);
-    config.learner.optimiser = crate::config::OptimiserKind::Rmsprop;
+    let mut config = config("central-v");
+    config.algorithm.set("optimiser", "rmsprop").unwrap();
     assert!(train(&config, &[1], 2) == train(&config, &[1], u64::MAX));
 }
 
 fn trained() -> (Trainer, Checkpoint) {
-    let mut trainer = Trainer::new(&config(Algorithm::CentralV), 1).unwrap();
+    let mut trainer = Trainer::new(&config("central-v"), 1).unwrap();
     // Until something has been learnt since the last row.
     while trainer.update().unwrap().is_some() {}
     let checkpoint = trainer.checkpoint();
@@ -118,13 +119,13 @@ fn counters_that_no_run_can_have_are_refused_by_name() {
 #[test]
 fn a_checkpoint_of_another_configuration_is_refused() {
     let (_, checkpoint) = trained();
-    let mut wider = config(Algorithm::CentralV);
-    wider.policy.hidden = 7;
+    let mut wider = config("central-v");
+    wider.algorithm.set("hidden", 7).unwrap();
     let error = Trainer::new(&wider, 1).unwrap().restore(&checkpoint);
     let error = error.unwrap_err().to_string();
     assert!(error.contains("expected F32 of shape"), "{error}");
-    let mut other = config(Algorithm::CentralV);
-    other.learner.optimiser = crate::config::OptimiserKind::Rmsprop;
+    let mut other = config("central-v");
+    other.algorithm.set("optimiser", "rmsprop").unwrap();
     let error = Trainer::new(&other, 1).unwrap().restore(&checkpoint);
     let error = error.unwrap_err().to_string();
     assert!(error.contains("no tensor `opt.rmsprop.v."), "{error}");
