@@ -1,27 +1,20 @@
 //! The `mackrl` program: train, evaluate, certify and reproduce.
 //!
 //! This crate holds no algorithm. `args` is what was typed, `commands` what it means, `reproduce` one command for each figure
-//! of the paper, `plot` the drawing of its results, `replay` the looking into recorded episodes, `serve` runs in the browser,
-//! `training_loop` the loop around a trainer, `run_folder` what a run leaves on disk, `sweep` many runs side by side, `recorded` the
-//! runs that were made earlier, `provenance` where a result comes from,
-//! `progress` what a person sees while waiting, `signals` how a person stops waiting, `failure` the one place that turns errors into exit codes. Data go to stdout, everything else to stderr.
+//! of the paper, `plot` the drawing of its results, `replay` the looking into recorded episodes, `serve` runs in the browser;
+//! runs themselves, on disk and side by side, are `mackrl_run`'s.
+//! `progress` is what a person sees while waiting, `signals` how a person stops waiting, `failure` the one place that turns errors into exit codes. Data go to stdout, everything else to stderr.
 
 mod args;
-mod bounded;
 mod commands;
 mod failure;
 mod output;
 mod plot;
 mod progress;
-mod provenance;
-mod recorded;
 mod replay;
 mod reproduce;
-mod run_folder;
 mod serve;
 mod signals;
-mod sweep;
-mod training_loop;
 
 use std::process::ExitCode;
 

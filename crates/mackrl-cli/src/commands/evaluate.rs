@@ -10,7 +10,9 @@ use mackrl::policy::Behaviour;
 use mackrl_env::{EpisodeKey, Stream};
 use mackrl_run::{
     config::Engine,
+    provenance::{Choice, Judgement, Provenance},
     replay::record_policy,
+    run_folder::Run,
     training::{Episodes, Evaluation, evaluate_in},
 };
 use serde_json::Value;
@@ -20,9 +22,7 @@ use crate::{
     commands::sc2,
     failure::Failure,
     output::{self, Sourced},
-    provenance::{Choice, Judgement, Provenance},
-    reproduce::Meter,
-    run_folder::Run,
+    progress::Meter,
 };
 
 /// Plays greedy episodes with a trained team and prints how it did.

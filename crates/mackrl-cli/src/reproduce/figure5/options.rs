@@ -5,9 +5,10 @@ use std::{num::NonZeroUsize, path::PathBuf, thread};
 use clap::{Args, ValueEnum, builder::RangedU64ValueParser};
 use mackrl_env::matrix_game::MATRIX_GAME;
 use mackrl_env::matrix_game::{MatrixGameSettings, ObservationDistribution, Payoffs};
-use mackrl_run::config::EnvironmentConfig;
-
-use crate::provenance::{Choice, Judgement, Provenance};
+use mackrl_run::{
+    config::EnvironmentConfig,
+    provenance::{Choice, Judgement, Provenance},
+};
 
 /// Reproduce Figure 5: MACKRL, independent learners and a joint learner on the matrix game.
 ///
