@@ -1,81 +1,53 @@
-//! From errors to exit codes and words: the one place that knows both.
+//! From errors to exit codes and words: the one place that has both.
 
 use std::{
+    error::Error as StdError,
     fmt,
-    io::{self, Write},
-    path::PathBuf,
+    io::{self, ErrorKind, Write},
     process::ExitCode,
 };
 
-use mackrl::{NotFinite, nn::UnknownInstructionSet};
+use mackrl::nn::UnknownInstructionSet;
 use mackrl_env::StepError;
-use mackrl_run::config::ConfigError;
-
-use crate::provenance::CODE;
+use mackrl_run::{RunError, config::ConfigError};
+use thiserror::Error;
 
 /// What can go wrong in this program beyond what its libraries say.
-#[derive(Debug)]
+#[derive(Debug, Error)]
 pub(crate) enum Failure {
-    /// A folder in which nothing may be overwritten.
-    FolderInUse {
-        folder: PathBuf,
-        /// What lies there, for "holds ...".
-        holds: String,
-    },
-    /// A folder in which a run can go on.
-    UnfinishedRun { folder: PathBuf },
-    /// A folder in which another process writes.
-    FolderLocked { folder: PathBuf },
-    /// A run that was asked to stop, and can go on.
-    Interrupted { folder: PathBuf, steps_env: u64 },
-    /// A folder in which no run lies.
-    NotARun { folder: PathBuf },
-    /// Stored data that cannot be used.
+    /// Flags that do not go together.
+    #[error("{message}")]
+    Usage { message: String },
+    /// Data that cannot be used.
+    #[error("{message}")]
     BadData { message: String },
-    /// An update with a number that is not finite, of which nothing was kept.
-    UpdateRefused {
-        number: Box<NotFinite>,
-        folder: PathBuf,
-    },
     /// Two things that were compared are not the same.
+    #[error("they differ, first in {first}")]
     Different {
         /// The first difference, in words.
         first: String,
     },
-    /// A result of another version of this program, among which results of this one were to stand.
-    OtherCode { path: PathBuf, code: String },
+    /// A result of other code, among which results of this program were to stand.
+    #[error("{message}")]
+    OtherCode { message: String },
     /// StarCraft II is not as it has to be.
     #[cfg_attr(
         not(all(feature = "sc2", target_os = "linux")),
         expect(dead_code, reason = "only the commands around the game make it")
     )]
+    #[error("StarCraft II cannot be played on here: problems: {problems}")]
     NotReady {
         /// How much is wrong.
         problems: usize,
     },
     /// A team that does not run decentralised.
+    #[error("not decentralised: {mismatches} actions differ from the central run")]
     CertificateFailed { mismatches: u64 },
-    /// Flags that do not go together.
-    Usage { message: String },
-    /// A folder that holds another run than the one that should be made there.
-    OtherConfiguration {
-        folder: PathBuf,
-        /// A setting in which they differ.
-        key: String,
-    },
-    /// Many runs that were asked to stop, and can go on.
-    SweepInterrupted { finished: usize, runs: usize },
-    /// A metric that a run does not have.
-    MissingMetric { message: String },
-    /// Runs that are not repetitions of one experiment.
-    UnlikeRuns {
-        message: String,
-        /// What can be done.
-        remedy: String,
-    },
     /// A recorded episode that does not play as it did.
+    #[error("{message}")]
     ReplayDiffers { message: String },
     /// A replay that another version of this program plays.
+    #[error("{message}")]
     OtherSimulator {
         message: String,
         /// Version of the program that plays it.
@@ -83,92 +55,12 @@ pub(crate) enum Failure {
     },
 }
 
-impl fmt::Display for Failure {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::FolderInUse { folder, holds } => write!(
-                formatter,
-                "{} already holds {holds}, and is not overwritten",
-                folder.display()
-            ),
-            Self::UnfinishedRun { folder } => write!(
-                formatter,
-                "{} already holds an unfinished run, and is not overwritten",
-                folder.display()
-            ),
-            Self::FolderLocked { folder } => write!(
-                formatter,
-                "another process is writing in {}",
-                folder.display()
-            ),
-            Self::Interrupted { folder, steps_env } => write!(
-                formatter,
-                "{} was interrupted at {steps_env} environment steps",
-                folder.display()
-            ),
-            Self::NotARun { folder } => write!(
-                formatter,
-                "{} is not a run folder: it has no config.toml",
-                folder.display()
-            ),
-            Self::OtherCode { path, code } => write!(
-                formatter,
-                "{} was made by code {code}, expected {CODE}",
-                path.display()
-            ),
-            Self::OtherConfiguration { folder, key } => write!(
-                formatter,
-                "{} holds a run with another configuration: `{key}` is different",
-                folder.display()
-            ),
-            Self::SweepInterrupted { finished, runs } => {
-                write!(
-                    formatter,
-                    "interrupted when {finished} of {runs} runs were finished"
-                )
-            }
-            Self::UpdateRefused { number, .. } => {
-                write!(formatter, "the run cannot go on: {number}")
-            }
-            Self::Different { first } => write!(formatter, "they differ, first in {first}"),
-            Self::BadData { message }
-            | Self::Usage { message }
-            | Self::MissingMetric { message }
-            | Self::UnlikeRuns { message, .. }
-            | Self::ReplayDiffers { message }
-            | Self::OtherSimulator { message, .. } => formatter.write_str(message),
-            Self::NotReady { problems } => {
-                write!(
-                    formatter,
-                    "StarCraft II cannot be played on here: problems: {problems}"
-                )
-            }
-            Self::CertificateFailed { mismatches } => write!(
-                formatter,
-                "not decentralised: {mismatches} actions differ from the central run"
-            ),
-        }
-    }
-}
-
-impl std::error::Error for Failure {}
-
 impl Failure {
     /// Flags that do not go together, in words.
     pub(crate) fn usage(message: impl fmt::Display) -> Self {
         Self::Usage {
             message: message.to_string(),
         }
-    }
-
-    /// Whether a run lacks a metric that it was asked for.
-    pub(crate) fn is_missing_metric(error: &anyhow::Error) -> bool {
-        matches!(error.downcast_ref(), Some(Self::MissingMetric { .. }))
-    }
-
-    /// Whether a run ended because it was asked to.
-    pub(crate) fn is_interruption(error: &anyhow::Error) -> bool {
-        matches!(error.downcast_ref(), Some(Self::Interrupted { .. }))
     }
 }
 
@@ -183,6 +75,9 @@ enum Exit {
     InputOutput = 74,
     Interrupted = 75,
 }
+
+/// What a cause means for the program: its exit code, and what helps, as far as either is known.
+type Verdict = (Option<Exit>, Option<String>);
 
 /// Tells what went wrong, if something did, and gives the exit code.
 pub(crate) fn report(outcome: anyhow::Result<()>) -> ExitCode {
@@ -200,10 +95,15 @@ pub(crate) fn report(outcome: anyhow::Result<()>) -> ExitCode {
 /// The chain of causes on one line, and the remedy on another if one is known.
 fn explain(error: &anyhow::Error) -> String {
     let mut text = format!("error: {}\n", printable(&format!("{error:#}")));
-    if let Some(hint) = hint(error) {
+    if let Some(hint) = error.chain().find_map(|cause| verdict(cause).1) {
         text.push_str(&format!("hint: {hint}\n"));
     }
     text
+}
+
+fn exit(error: &anyhow::Error) -> Exit {
+    let known = error.chain().find_map(|cause| verdict(cause).0);
+    known.unwrap_or(Exit::Defect)
 }
 
 /// What may be shown of a text that quotes a stranger's file: one line, not endless, and nothing that controls a terminal.
@@ -220,99 +120,130 @@ pub(crate) fn printable(text: &str) -> String {
     shown
 }
 
-fn exit(error: &anyhow::Error) -> Exit {
-    error.chain().find_map(exit_of).unwrap_or(Exit::Defect)
+/// What one cause in a chain means.
+fn verdict(cause: &(dyn StdError + 'static)) -> Verdict {
+    if let Some(failure) = cause.downcast_ref() {
+        of_failure(failure)
+    } else if let Some(error) = cause.downcast_ref() {
+        of_run(error)
+    } else if let Some(error) = cause.downcast_ref() {
+        of_library(error)
+    } else if let Some(error) = cause.downcast_ref() {
+        (Some(Exit::Configuration), hint_of_config(error))
+    } else if cause.is::<UnknownInstructionSet>() {
+        (Some(Exit::Configuration), None)
+    } else if let Some(error) = cause.downcast_ref::<io::Error>() {
+        use ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+        let is_full = matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge);
+        let hint = "make room; a run that was being trained goes on with `mackrl resume DIR`";
+        (Some(Exit::InputOutput), is_full.then(|| hint.to_owned()))
+    } else {
+        (None, None)
+    }
 }
 
-fn exit_of(cause: &(dyn std::error::Error + 'static)) -> Option<Exit> {
-    if let Some(failure) = cause.downcast_ref::<Failure>() {
-        return Some(match failure {
-            Failure::FolderInUse { .. }
-            | Failure::UnfinishedRun { .. }
-            | Failure::FolderLocked { .. }
-            | Failure::NotARun { .. }
-            | Failure::OtherCode { .. }
-            | Failure::OtherConfiguration { .. }
-            | Failure::MissingMetric { .. }
-            | Failure::UnlikeRuns { .. }
-            | Failure::Usage { .. } => Exit::Usage,
-            Failure::Interrupted { .. } | Failure::SweepInterrupted { .. } => Exit::Interrupted,
-            Failure::BadData { .. }
-            | Failure::UpdateRefused { .. }
-            | Failure::ReplayDiffers { .. }
-            | Failure::OtherSimulator { .. } => Exit::Data,
-            Failure::NotReady { .. } => Exit::InputOutput,
-            Failure::CertificateFailed { .. } | Failure::Different { .. } => Exit::Differs,
-        });
-    }
-    if let Some(error) = cause.downcast_ref::<mackrl::Error>() {
-        return Some(match error {
-            mackrl::Error::Config(_) => Exit::Configuration,
-            mackrl::Error::Step(StepError::Interrupted(_)) => Exit::InputOutput,
-            mackrl::Error::Data(_) | mackrl::Error::NotFinite { .. } => Exit::Data,
-            _ => Exit::Defect,
-        });
-    }
-    if cause.is::<ConfigError>() || cause.is::<UnknownInstructionSet>() {
-        return Some(Exit::Configuration);
-    }
-    cause.is::<io::Error>().then_some(Exit::InputOutput)
+fn of_failure(failure: &Failure) -> Verdict {
+    let (exit, hint) = match failure {
+        Failure::Usage { .. } => (Exit::Usage, None),
+        Failure::BadData { .. } => (Exit::Data, None),
+        Failure::Different { .. } | Failure::CertificateFailed { .. } => (Exit::Differs, None),
+        Failure::OtherCode { .. } => (
+            Exit::Usage,
+            Some("take such results as they are with --any-code, or choose another folder with --out".to_owned()),
+        ),
+        Failure::NotReady { .. } => (Exit::InputOutput, None),
+        Failure::ReplayDiffers { .. } => (
+            Exit::Data,
+            Some("the file was changed, or its program simulated otherwise: record it again".to_owned()),
+        ),
+        Failure::OtherSimulator { program, .. } => (
+            Exit::Data,
+            Some(format!("mackrl {program}, which recorded it, plays it")),
+        ),
+    };
+    (Some(exit), hint)
 }
 
-fn hint(error: &anyhow::Error) -> Option<String> {
-    error.chain().find_map(hint_of)
-}
-
-fn hint_of(cause: &(dyn std::error::Error + 'static)) -> Option<String> {
-    if let Some(failure) = cause.downcast_ref::<Failure>() {
-        return match failure {
-            Failure::FolderInUse { .. } => {
-                Some("choose another folder with --out, or move this one away".to_owned())
-            }
-            Failure::UnfinishedRun { folder } => Some(format!(
-                "go on with `mackrl resume {}`, or choose another folder with --out",
-                folder.display()
+fn of_run(error: &RunError) -> Verdict {
+    let resume = |folder: &std::path::Path| format!("`mackrl resume {}`", folder.display());
+    let (exit, hint) = match error {
+        RunError::Config(error) => return verdict(error),
+        RunError::Learning(error) => return of_library(error),
+        RunError::FolderInUse { .. } => (
+            Exit::Usage,
+            Some("choose another folder with --out, or move this one away".to_owned()),
+        ),
+        RunError::UnfinishedRun { folder } => (
+            Exit::Usage,
+            Some(format!(
+                "go on with {}, or choose another folder with --out",
+                resume(folder)
             )),
-            Failure::Interrupted { folder, .. } => {
-                Some(format!("go on with `mackrl resume {}`", folder.display()))
-            }
-            Failure::NotARun { .. } => Some(
+        ),
+        RunError::FolderLocked { .. }
+        | RunError::MissingMetric { .. }
+        | RunError::Selection { .. } => (Exit::Usage, None),
+        RunError::NotARun { .. } => (
+            Exit::Usage,
+            Some(
                 "give the folder that `mackrl train` wrote, such as runs/3m-mackrl-seed1"
                     .to_owned(),
             ),
-            Failure::OtherConfiguration { .. } => Some(
-                "choose another folder with --out, or move this run away".to_owned(),
-            ),
-            Failure::SweepInterrupted { .. } => Some("go on with the same command".to_owned()),
-            Failure::UnlikeRuns { remedy, .. } => Some(remedy.clone()),
-            Failure::UpdateRefused { folder, .. } => Some(format!(
-                "`mackrl resume {}` goes on from the last checkpoint and repeats the update to the bit; smaller learning rates, gradients or rewards avoid it",
-                folder.display()
+        ),
+        RunError::OtherConfiguration { .. } => (
+            Exit::Usage,
+            Some("choose another folder with --out, or move this run away".to_owned()),
+        ),
+        RunError::NoneFinished { .. } => (
+            Exit::Usage,
+            Some("--unfinished uses them as far as they have come".to_owned()),
+        ),
+        RunError::UnlikeRuns { key: Some(key), .. } => (
+            Exit::Usage,
+            Some(format!(
+                "tell them apart with --by {key}, or use them together all the same with --mix"
             )),
-            Failure::OtherCode { .. } => Some(
-                "take such results as they are with --any-code, or choose another folder with --out"
-                    .to_owned(),
-            ),
-            Failure::ReplayDiffers { .. } => Some(
-                "the file was changed, or its program simulated otherwise: record it again"
-                    .to_owned(),
-            ),
-            Failure::OtherSimulator { program, .. } => {
-                Some(format!("mackrl {program}, which recorded it, plays it"))
-            }
-            _ => None,
-        };
+        ),
+        RunError::UnlikeRuns { key: None, .. } => (
+            Exit::Usage,
+            Some("use them together all the same with --mix".to_owned()),
+        ),
+        RunError::Interrupted { folder, .. } => (
+            Exit::Interrupted,
+            Some(format!("go on with {}", resume(folder))),
+        ),
+        RunError::SweepInterrupted { .. } => (
+            Exit::Interrupted,
+            Some("go on with the same command".to_owned()),
+        ),
+        RunError::UpdateRefused { folder, .. } => (
+            Exit::Data,
+            Some(format!(
+                "{} goes on from the last checkpoint and repeats the update to the bit; smaller learning rates, gradients or rewards avoid it",
+                resume(folder)
+            )),
+        ),
+        RunError::BadData { .. } => (Exit::Data, None),
+        // What caused these says more.
+        _ => return (None, None),
+    };
+    (Some(exit), hint)
+}
+
+fn of_library(error: &mackrl::Error) -> Verdict {
+    match error {
+        mackrl::Error::Config(_) => (Some(Exit::Configuration), None),
+        mackrl::Error::Step(StepError::Interrupted(_)) => (
+            Some(Exit::InputOutput),
+            Some("`mackrl sc2 doctor --start` looks for the cause".to_owned()),
+        ),
+        mackrl::Error::Data(_) | mackrl::Error::NotFinite { .. } => (Some(Exit::Data), None),
+        _ => (Some(Exit::Defect), None),
     }
-    if let Some(mackrl::Error::Step(StepError::Interrupted(_))) = cause.downcast_ref() {
-        return Some("`mackrl sc2 doctor --start` looks for the cause".to_owned());
-    }
-    if let Some(error) = cause.downcast_ref::<io::Error>() {
-        use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
-        return matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge).then(|| {
-            "make room; a run that was being trained goes on with `mackrl resume DIR`".to_owned()
-        });
-    }
-    match cause.downcast_ref::<ConfigError>()? {
+}
+
+fn hint_of_config(error: &ConfigError) -> Option<String> {
+    match error {
         ConfigError::UnknownMap { .. } => Some(
             "`mackrl maps` lists every map; the name of a scenario file ends in .toml".to_owned(),
         ),
@@ -341,12 +272,14 @@ fn reader_has_gone(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause
             .downcast_ref::<io::Error>()
-            .is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
+            .is_some_and(|error| error.kind() == ErrorKind::BrokenPipe)
     })
 }
 
 #[cfg(test)]
 mod tests {
+    use std::path::PathBuf;
+
     use anyhow::Context;
     use mackrl_run::config::Config;
 
@@ -355,7 +288,7 @@ mod tests {
     #[test]
     fn every_kind_of_error_has_its_exit_code() {
         let config = Config::with(&["a=1"]).unwrap_err();
-        let missing = io::Error::from(io::ErrorKind::NotFound);
+        let missing = io::Error::from(ErrorKind::NotFound);
         let folder = PathBuf::from("x");
         let cases: [(anyhow::Error, Exit); 8] = [
             (config.clone().into(), Exit::Configuration),
@@ -363,14 +296,14 @@ mod tests {
             (mackrl::Error::Data(String::new()).into(), Exit::Data),
             (missing.into(), Exit::InputOutput),
             (
-                Failure::Interrupted {
+                RunError::Interrupted {
                     folder: folder.clone(),
                     steps_env: 1,
                 }
                 .into(),
                 Exit::Interrupted,
             ),
-            (Failure::NotARun { folder }.into(), Exit::Usage),
+            (RunError::NotARun { folder }.into(), Exit::Usage),
             (
                 Failure::CertificateFailed { mismatches: 1 }.into(),
                 Exit::Differs,

@@ -1,65 +1,9 @@
-//! The `mackrl` program: train, evaluate, certify and reproduce.
-//!
-//! This crate holds no algorithm. `args` is what was typed, `commands` what it means, `reproduce` one command for each figure
-//! of the paper, `plot` the drawing of its results, `replay` the looking into recorded episodes, `serve` runs in the browser,
-//! `training_loop` the loop around a trainer, `run_folder` what a run leaves on disk, `sweep` many runs side by side, `recorded` the
-//! runs that were made earlier, `provenance` where a result comes from,
-//! `progress` what a person sees while waiting, `signals` how a person stops waiting, `failure` the one place that turns errors into exit codes. Data go to stdout, everything else to stderr.
+//! The program `mackrl`, with everything that is built in.
 
-mod args;
-mod bounded;
-mod commands;
-mod failure;
-mod output;
-mod plot;
-mod progress;
-mod provenance;
-mod recorded;
-mod replay;
-mod reproduce;
-mod run_folder;
-mod serve;
-mod signals;
-mod sweep;
-mod training_loop;
+use std::process::ExitCode;
 
-use std::{process::ExitCode, sync::OnceLock};
-
-use clap::Parser;
-use mackrl::nn::InstructionSet;
 use mackrl_run::config::Registry;
 
-use crate::args::{Cli, Command};
-
-/// The worlds and the algorithms that this program offers.
-fn registry() -> &'static Registry {
-    static REGISTRY: OnceLock<Registry> = OnceLock::new();
-    REGISTRY.get_or_init(Registry::built_in)
-}
-
 fn main() -> ExitCode {
-    if let Err(error) = InstructionSet::chosen() {
-        return failure::report(Err(error.into()));
-    }
-    let outcome = match Cli::parse().command {
-        Command::Train(args) => commands::train::run(&args),
-        Command::Resume(args) => commands::resume::run(&args),
-        Command::Evaluate(args) => commands::evaluate::run(&args),
-        Command::Certify(args) => commands::certify::run(&args),
-        Command::ExecuteAgent(args) => commands::execute_agent::run(&args),
-        Command::Sweep(args) => commands::sweep::run(&args),
-        Command::Plot(args) => commands::plot::run(&args),
-        Command::Report(args) => commands::report::run(&args),
-        Command::Reproduce(args) => commands::reproduce::run(&args),
-        Command::Play(args) => commands::play::run(&args),
-        Command::Replay(args) => commands::replay::run(&args),
-        Command::Explain(args) => commands::explain::run(&args),
-        Command::Serve(args) => commands::serve::run(&args),
-        Command::Maps(args) => commands::maps::run(&args),
-        Command::Diff(args) => commands::diff::run(&args),
-        Command::Config(args) => commands::config::run(&args),
-        Command::Bench(args) => commands::bench::run(&args),
-        Command::Sc2(args) => commands::sc2::run(&args),
-    };
-    failure::report(outcome)
+    mackrl_cli::run(Registry::built_in())
 }

@@ -6,9 +6,8 @@ use std::{
 };
 
 use anyhow::Context;
+use mackrl_run::provenance::Provenance;
 use serde::Serialize;
-
-use crate::provenance::Provenance;
 
 /// Writes `text` to stdout.
 pub(crate) fn print(text: &str) -> anyhow::Result<()> {

@@ -3,8 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum, builder::RangedU64ValueParser};
-
-use crate::recorded::{Axis, Selection};
+use mackrl_run::recorded::{self, Selection};
 
 /// Draw learning curves of many runs
 ///
@@ -31,7 +30,7 @@ pub(crate) struct PlotArgs {
 
     /// What it is drawn over
     #[arg(long, value_name = "AXIS", default_value = "steps")]
-    pub(crate) x: Axis,
+    pub(crate) x: CurveAxis,
 
     /// Average of the runs, and what the band around it is
     #[arg(long, value_name = "NAME", default_value = "mean")]
@@ -44,6 +43,25 @@ pub(crate) struct PlotArgs {
     /// Print the points as JSON instead of a sentence
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// What a curve is drawn over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum CurveAxis {
+    /// Environment steps, summed over the parallel environments.
+    Steps,
+    /// Seconds of training and testing, pauses left out: what sys/sps says, added up.
+    WallClock,
+}
+
+impl CurveAxis {
+    /// As runs are read over it.
+    pub(crate) const fn recorded(self) -> recorded::Axis {
+        match self {
+            Self::Steps => recorded::Axis::Steps,
+            Self::WallClock => recorded::Axis::WallClock,
+        }
+    }
 }
 
 /// An average and its uncertainty.

@@ -1,12 +1,13 @@
 //! The flags from which a configuration is put together.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
-use mackrl_run::config::{ConfigBuilder, ConfigError, EnvironmentConfig, Preset};
-use mackrl_skirmish::custom::LENGTH_MAX;
-
-use crate::bounded;
+use mackrl_run::{
+    bounded,
+    config::{ConfigBuilder, EnvironmentConfig, Preset},
+    scenario_file::with_scenario,
+};
 
 /// Greatest length of a configuration in bytes; it may hold the text of a scenario, every character escaped.
 const FILE_MAX: usize = 2 << 20;
@@ -24,34 +25,6 @@ pub(crate) fn world(
         builder = builder.set(assignment)?;
     }
     Ok(with_scenario(builder)?.build_environment()?)
-}
-
-/// Lays the text of the scenario file that the map names, if it names one.
-pub(crate) fn with_scenario(builder: ConfigBuilder) -> anyhow::Result<ConfigBuilder> {
-    match builder.missing_scenario() {
-        Some(file) => Ok(builder.scenario(&read_scenario(Path::new(&file))?)),
-        None => Ok(builder),
-    }
-}
-
-/// Reads a scenario file, which may be anything: no more of it than a scenario may have.
-pub(crate) fn read_scenario(path: &Path) -> anyhow::Result<String> {
-    let bytes = bounded::read(path, LENGTH_MAX)?;
-    if bytes.is_empty() {
-        let message = format!(
-            "{}:1:1: found an empty file, expected a scenario",
-            path.display()
-        );
-        return Err(ConfigError::Scenario { message }.into());
-    }
-    String::from_utf8(bytes).map_err(|error| {
-        let message = format!(
-            "{}: not UTF-8 text at byte {}",
-            path.display(),
-            error.utf8_error().valid_up_to()
-        );
-        ConfigError::Scenario { message }.into()
-    })
 }
 
 fn env_help() -> String {
@@ -148,7 +121,7 @@ impl ConfigurationArgs {
         for assignment in &self.set {
             builder = builder.set(assignment)?;
         }
-        with_scenario(builder)
+        Ok(with_scenario(builder)?)
     }
 
     fn short_flags(&self) -> [(&'static str, &'static str, Option<String>); 4] {

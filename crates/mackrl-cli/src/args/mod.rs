@@ -19,19 +19,17 @@ use std::{path::PathBuf, sync::LazyLock};
 
 use clap::{Args, Parser, Subcommand};
 use mackrl::nn::InstructionSet;
+use mackrl_run::provenance::CODE;
 
-use crate::{
-    provenance::CODE,
-    reproduce::{
-        ablations::AblationOptions, all::AllOptions, figure5::Figure5Options,
-        figure6::Figure6Options, figure7::Figure7Options,
-    },
+use crate::reproduce::{
+    ablations::AblationOptions, all::AllOptions, figure5::Figure5Options, figure6::Figure6Options,
+    figure7::Figure7Options,
 };
-pub(crate) use analysis::{CurveStatistic, PlotArgs, ReportArgs};
+pub(crate) use analysis::{CurveAxis, CurveStatistic, PlotArgs, ReportArgs};
 pub(crate) use bench::{
     BenchArgs, BenchCommand, BenchEnvironmentArgs, BenchTrainArgs, BenchUpdateArgs,
 };
-pub(crate) use configuration::{ConfigurationArgs, read_scenario, with_scenario, world};
+pub(crate) use configuration::{ConfigurationArgs, world};
 pub(crate) use inquiry::DiffArgs;
 pub(crate) use play::PlayArgs;
 pub(crate) use replay::{ExplainArgs, ReplayArgs};

@@ -8,7 +8,11 @@ use std::{
 
 use anyhow::Context;
 use mackrl::decentralised::{AgentLink, Answer, Certificate, Request, Subject};
-use mackrl_run::training::assembly;
+use mackrl_run::{
+    provenance::{Choice, Judgement, Provenance},
+    run_folder::Run,
+    training::assembly,
+};
 use serde_json::Value;
 
 use crate::{
@@ -16,9 +20,7 @@ use crate::{
     commands::sc2,
     failure::Failure,
     output::{self, Sourced},
-    provenance::{Choice, Judgement, Provenance},
-    reproduce::Meter,
-    run_folder::Run,
+    progress::Meter,
 };
 
 /// Compares a trained team's central run with its agents in processes of their own, and fails if anything differs.

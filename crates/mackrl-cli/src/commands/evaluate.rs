@@ -9,7 +9,9 @@ use anyhow::Context;
 use mackrl::policy::Behaviour;
 use mackrl_env::{EpisodeKey, Stream};
 use mackrl_run::{
+    provenance::{Choice, Judgement, Provenance},
     replay::record_policy,
+    run_folder::Run,
     training::{Episodes, Evaluation, evaluate_in},
 };
 use serde_json::Value;
@@ -19,9 +21,7 @@ use crate::{
     commands::sc2,
     failure::Failure,
     output::{self, Sourced},
-    provenance::{Choice, Judgement, Provenance},
-    reproduce::Meter,
-    run_folder::Run,
+    progress::Meter,
 };
 
 /// Plays greedy episodes with a trained team and prints how it did.

@@ -4,9 +4,12 @@ use std::io;
 
 use mackrl::decentralised::serve_agent;
 use mackrl_env::AgentId;
-use mackrl_run::training::assembly::{self, World};
+use mackrl_run::{
+    run_folder::Run,
+    training::assembly::{self, World},
+};
 
-use crate::{args::ExecuteAgentArgs, failure::Failure, run_folder::Run};
+use crate::{args::ExecuteAgentArgs, failure::Failure};
 
 /// Answers what arrives on stdin until it ends.
 pub(crate) fn run(args: &ExecuteAgentArgs) -> anyhow::Result<()> {

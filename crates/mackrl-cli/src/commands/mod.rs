@@ -1,5 +1,7 @@
 //! What each command does.
 
+use mackrl_run::recorded::Grouping;
+
 pub(crate) mod bench;
 pub(crate) mod certify;
 pub(crate) mod config;
@@ -24,8 +26,6 @@ pub(crate) mod sweep;
 pub(crate) mod train;
 
 use std::io::{self, Write};
-
-use crate::recorded::Grouping;
 
 /// Says that runs were left out, if some were.
 fn note_left_out(grouping: &Grouping) {

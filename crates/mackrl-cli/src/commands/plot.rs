@@ -3,16 +3,18 @@
 use std::path::Path;
 
 use mackrl::statistics::{Aggregate, Bootstrap, mean_and_standard_error};
+use mackrl_run::{
+    recorded::{Gridded, Grouping, find, group},
+    run_folder,
+};
 use serde::Serialize;
 
 use super::note_left_out;
 use crate::{
-    args::{CurveStatistic, PlotArgs},
+    args::{CurveAxis, CurveStatistic, PlotArgs},
     failure::Failure,
     output,
     plot::{Axis, Colour, Corner, LineChart, Mark, Point, Series},
-    recorded::{self, Gridded, Grouping, find, group},
-    run_folder,
 };
 
 /// Resamples of each interval along a curve: there are hundreds of them, and a pixel is all that they have to be right to.
@@ -61,17 +63,17 @@ fn curves(
     let mut curves = Vec::new();
     let mut missing = None;
     for series in &grouping.series {
-        match Gridded::read(series, &args.metric, args.x) {
+        match Gridded::read(series, &args.metric, args.x.recorded()) {
             Ok(gridded) => {
                 let points = points(&gridded, args.statistic);
                 curves.push((series.name.clone(), series.runs.len(), points));
             }
-            Err(error) if Failure::is_missing_metric(&error) => missing = Some(error),
-            Err(error) => return Err(error),
+            Err(error) if error.is_missing_metric() => missing = Some(error),
+            Err(error) => return Err(error.into()),
         }
     }
     match missing {
-        Some(error) if curves.is_empty() => Err(error),
+        Some(error) if curves.is_empty() => Err(error.into()),
         _ => Ok(curves),
     }
 }
@@ -170,8 +172,8 @@ fn chart(args: &PlotArgs, map: &str, drawn: &[(String, usize, Vec<Point>)]) -> L
         .into(),
         x_axis: Axis {
             label: match args.x {
-                recorded::Axis::Steps => "Environment steps",
-                recorded::Axis::WallClock => "Seconds of training and testing",
+                CurveAxis::Steps => "Environment steps",
+                CurveAxis::WallClock => "Seconds of training and testing",
             }
             .into(),
             range: None,

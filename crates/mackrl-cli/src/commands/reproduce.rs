@@ -7,7 +7,8 @@ use serde::Serialize;
 use crate::{
     args::{Figure, ReproduceArgs},
     output,
-    reproduce::{Meter, ablations, all, figure5, figure6, figure7},
+    progress::Meter,
+    reproduce::{ablations, all, figure5, figure6, figure7},
 };
 
 pub(crate) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {

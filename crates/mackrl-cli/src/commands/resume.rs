@@ -2,75 +2,75 @@
 
 use std::{
     io::{self, Write},
+    num::NonZeroUsize,
     path::Path,
+    process::Command,
 };
 
-use mackrl_run::training::Trainer;
+use anyhow::Context;
+use mackrl_run::{
+    RunError,
+    stop_request::StopRequest,
+    sweep::{self, Entry, Outcome},
+    training_loop::{self, Summary},
+};
 
+use super::train::print;
 use crate::{
     args::ResumeArgs,
     commands::sc2,
-    failure::printable,
-    provenance::CODE,
-    run_folder::{Resumption, RunFolder},
-    signals::StopRequest,
-    training_loop::{self, Reporting, Summary},
+    progress::{RunProgress, SweepProgress},
+    signals,
 };
 
 /// Continues a run at its latest checkpoint; from then on it is as if it had never stopped.
 pub(crate) fn run(args: &ResumeArgs) -> anyhow::Result<()> {
-    let stop = StopRequest::listen()?;
+    let stop = signals::listen()?;
     if args.leashed {
-        stop.make_when_stdin_ends();
+        signals::stop_when_stdin_ends(&stop);
     }
     match go_on(&args.run, args.threads.count(), &stop)? {
-        Some(summary) => training_loop::print(&summary, args.json),
+        Some(summary) => print(&summary, args.json),
         None => Ok(()),
     }
 }
 
 /// Continues the run at `path` to its end; gives nothing if it is there already.
-///
-/// # Errors
-/// [`crate::failure::Failure::Interrupted`] when asked to stop; otherwise what went wrong.
-pub(crate) fn go_on(
+pub(super) fn go_on(
     path: &Path,
     threads: usize,
     stop: &StopRequest,
-) -> anyhow::Result<Option<Summary>> {
-    if RunFolder::is_finished(path) {
-        // Nothing is wrong: whoever starts runs again until they are finished gets what they want.
+) -> Result<Option<Summary>, RunError> {
+    let mut progress = RunProgress::new();
+    let summary = training_loop::resume(path, sc2::world, threads, stop, &mut progress)?;
+    if summary.is_none() {
+        // Nothing is wrong: starting runs again until they are finished is one way to make them.
         let folder = path.display();
         let _ = writeln!(io::stderr(), "{folder} is finished: nothing is left to do");
-        return Ok(None);
     }
-    let Resumption {
-        mut folder,
-        config,
-        checkpoint,
-        damaged,
-        earlier_code,
-    } = RunFolder::resume(path, threads)?;
-    for damage in damaged {
-        // The run continues from an earlier checkpoint, whether anybody reads this or not.
-        let _ = writeln!(
-            io::stderr(),
-            "warning: {}; an earlier one is used",
-            printable(&damage)
-        );
-    }
-    if let Some(code) = earlier_code {
-        let _ = writeln!(
-            io::stderr(),
-            "warning: the run was made by code {} and goes on with {CODE}: it may not be what either of them makes alone",
-            printable(&code)
-        );
-    }
-    let world = sc2::world(&config)?;
-    let trainer = match checkpoint {
-        Some(checkpoint) => Trainer::resumed(&config, &world, threads, &checkpoint)?,
-        None => Trainer::in_world(&config, &world, threads)?,
+    Ok(summary)
+}
+
+/// Makes all runs that are not finished, `jobs` at a time, each in a process that resumes it, and shows how they stand.
+pub(crate) fn make_all(
+    entries: &[Entry],
+    jobs: NonZeroUsize,
+    stop: &StopRequest,
+) -> anyhow::Result<Outcome> {
+    let program = std::env::current_exe().context("cannot find this program's file")?;
+    let process = |folder: &Path| {
+        let mut command = Command::new(&program);
+        command
+            .args(["resume", "--threads", "1", "--leashed"])
+            .arg(folder);
+        command
     };
-    let mut training = Reporting::new(trainer, &config, stop);
-    training_loop::train_into(&mut folder, &mut training, &config, stop).map(Some)
+    let mut progress = SweepProgress::new();
+    Ok(sweep::make_all(
+        entries,
+        jobs,
+        &process,
+        stop,
+        &mut progress,
+    )?)
 }

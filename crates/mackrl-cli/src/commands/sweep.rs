@@ -1,16 +1,16 @@
 //! `mackrl sweep`: many runs from one plan.
 
+use mackrl_run::{
+    stop_request::StopRequest,
+    sweep::{Entry, Outcome, Plan, State},
+};
 use serde::Serialize;
 
-use super::resume;
-use crate::{
-    args::SweepArgs,
-    failure::Failure,
-    output,
-    signals::StopRequest,
-    sweep::{Entry, Outcome, Plan, State, make_all},
-    training_loop,
+use super::{
+    resume::{self, make_all},
+    train,
 };
+use crate::{args::SweepArgs, failure::Failure, output, signals};
 
 /// Makes what the plan asks for, or lists it.
 pub(crate) fn run(args: &SweepArgs) -> anyhow::Result<()> {
@@ -18,9 +18,9 @@ pub(crate) fn run(args: &SweepArgs) -> anyhow::Result<()> {
     if args.list {
         return list(&plan, args.json);
     }
-    let stop = StopRequest::listen()?;
+    let stop = signals::listen()?;
     if let Some(limit) = args.time_limit {
-        stop.make_after(limit);
+        signals::stop_after(&stop, limit);
     }
     match args.index {
         Some(index) => one(&plan, index, args, &stop),
@@ -93,7 +93,7 @@ fn one(plan: &Plan, index: usize, args: &SweepArgs, stop: &StopRequest) -> anyho
     entry.state()?;
     entry.prepare()?;
     match resume::go_on(&entry.folder, args.threads.count(), stop)? {
-        Some(summary) => training_loop::print(&summary, args.json),
+        Some(summary) => train::print(&summary, args.json),
         None if args.json => output::print_json(&Listed::of((index, entry))?),
         None => Ok(()),
     }

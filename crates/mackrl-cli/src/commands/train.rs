@@ -3,33 +3,40 @@
 use std::path::{Path, PathBuf};
 
 use mackrl::nn::InstructionSet;
-use mackrl_run::{config::Config, training::Trainer};
-
-use crate::{
-    args::TrainArgs,
-    commands::sc2,
-    progress,
+use mackrl_run::{
+    config::Config,
     run_folder::RunFolder,
-    signals::StopRequest,
-    training_loop::{self, Reporting},
+    training_loop::{self, Summary},
 };
+
+use crate::{args::TrainArgs, commands::sc2, output, progress::RunProgress, signals};
 
 /// Trains a team. Everything that can be wrong with what was typed is found before the run folder is created.
 pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<()> {
     let config = args.configuration.layers()?.build()?;
     let path = args.out.clone().unwrap_or_else(|| default_folder(&config));
     RunFolder::check_free(&path)?;
-    let stop = StopRequest::listen()?;
+    let stop = signals::listen()?;
+    let world = sc2::world(&config)?;
     let threads = args.threads.count();
-    let mut training = Reporting::new(
-        Trainer::in_world(&config, &sc2::world(&config)?, threads)?,
-        &config,
-        &stop,
-    );
-    let mut folder = RunFolder::create(&path, &config, threads)?;
-    progress::announce(InstructionSet::chosen()?, threads);
-    let summary = training_loop::train_into(&mut folder, &mut training, &config, &stop)?;
-    training_loop::print(&summary, args.json)
+    let mut progress = RunProgress::new();
+    progress.announce(InstructionSet::chosen()?, threads);
+    let summary = training_loop::train(&path, &config, &world, threads, &stop, &mut progress)?;
+    print(&summary, args.json)
+}
+
+/// Prints what a finished run says of itself.
+pub(super) fn print(summary: &Summary, json: bool) -> anyhow::Result<()> {
+    if json {
+        return output::print_json(summary);
+    }
+    output::print(&format!(
+        "{}: {} environment steps in {:.1} s ({:.0} a second)\n",
+        summary.folder.display(),
+        summary.steps_env,
+        summary.wall_s,
+        summary.steps_per_s
+    ))
 }
 
 /// Where a run lies if nothing else is asked for.

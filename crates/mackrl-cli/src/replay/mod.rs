@@ -8,9 +8,12 @@ mod summary;
 use std::path::Path;
 
 use mackrl_env::AgentId;
-use mackrl_run::replay::{Names, Playback, Replay, ReplayError};
+use mackrl_run::{
+    bounded,
+    replay::{Names, Playback, Replay, ReplayError},
+};
 
-use crate::{bounded, failure::Failure};
+use crate::failure::Failure;
 pub(crate) use explanation::Explanation;
 pub(crate) use page::page;
 pub(crate) use picture::picture;

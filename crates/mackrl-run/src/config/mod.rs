@@ -34,7 +34,7 @@ pub use builder::{ConfigBuilder, Resolved};
 pub use document::{Leaf, SyntaxError, line_and_column, parse_document};
 pub use environment::EnvironmentConfig;
 pub use error::{ConfigError, Origin, nearest};
-pub use registry::{Registry, remark};
+pub use registry::{Registry, registry, remark};
 pub use schema::schema;
 pub use sections::{AlgorithmConfig, Config, RunConfig, Setting, TestConfig};
 pub use selected::{Kind, Selected};

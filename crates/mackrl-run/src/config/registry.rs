@@ -1,9 +1,9 @@
 //! The kinds of worlds and of algorithms that configurations can name.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use mackrl::algorithms::{self, AlgorithmKind, Preset};
-use mackrl_env::{WorldKind, matrix_game::MatrixGameKind};
+use mackrl_env::{WorldKind, matrix_game::MatrixGameKind, sanity};
 use mackrl_skirmish::{SKIRMISH, SkirmishKind};
 
 use crate::config::{
@@ -27,6 +27,16 @@ struct Registered {
     like: Option<&'static str>,
 }
 
+/// The kinds that this program offers, once it has started.
+static OFFERED: OnceLock<Registry> = OnceLock::new();
+
+/// The kinds that this program offers: those that it [installed](Registry::install), else the built-in ones. Recorded runs are
+/// read with them.
+#[must_use]
+pub fn registry() -> &'static Registry {
+    OFFERED.get_or_init(Registry::built_in)
+}
+
 impl Default for Registry {
     fn default() -> Self {
         Self::built_in()
@@ -44,7 +54,16 @@ impl Registry {
         registry
             .with_world(Arc::new(SkirmishKind))
             .with_world(Arc::new(MatrixGameKind))
+            .with_worlds(sanity::kinds())
             .with_world_like(Arc::new(StarCraftKind), SKIRMISH)
+    }
+
+    /// Makes this what the program offers, from its start on; gives it back if something was read with another before.
+    ///
+    /// # Errors
+    /// The registry itself, if [`registry`] was asked before.
+    pub fn install(self) -> Result<(), Self> {
+        OFFERED.set(self)
     }
 
     /// With another kind of world, in place of one that has its name.
@@ -58,6 +77,10 @@ impl Registry {
     pub fn with_world_like(self, kind: Arc<dyn WorldKind>, like: &'static str) -> Self {
         let like = Some(like);
         self.register(Registered { kind, like })
+    }
+
+    fn with_worlds(self, kinds: Vec<Arc<dyn WorldKind>>) -> Self {
+        kinds.into_iter().fold(self, Self::with_world)
     }
 
     fn register(mut self, world: Registered) -> Self {

@@ -3,12 +3,15 @@
 use std::path::Path;
 
 use anyhow::Context;
-use mackrl_run::training::{Difference, compare_tensors};
+use mackrl_run::{
+    bounded,
+    training::{Difference, compare_tensors},
+};
 use serde::Serialize;
 use serde_json::Value;
 
 use super::{Comparison, Differing};
-use crate::{bounded, failure::Failure};
+use crate::failure::Failure;
 
 /// Greatest length of a JSON file.
 const JSON_MAX: usize = 1 << 28;

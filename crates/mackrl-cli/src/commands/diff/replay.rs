@@ -4,15 +4,15 @@
 //! rows of metrics that come up on the way are compared with the recorded ones, so that records which do not belong to their
 //! configuration do not pass for a difference of the runs.
 
-use mackrl_run::training::{Difference, Trainer};
+use mackrl_run::{
+    run_folder::{Recorded, Row, timeless},
+    training::{Difference, Trainer},
+};
 use serde::Serialize;
 use serde_json::Value;
 
 use super::{Differing, files::in_words, runs::first_in_rows};
-use crate::{
-    reproduce::Meter,
-    run_folder::{Recorded, Row, timeless},
-};
+use crate::progress::Meter;
 
 /// What playing two runs again showed.
 #[derive(Debug, Serialize)]

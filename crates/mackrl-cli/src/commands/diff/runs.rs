@@ -1,6 +1,10 @@
 //! Two runs: what they were to do, what they recorded, and, played again, where they part.
 
-use mackrl_run::config::Config;
+use mackrl_run::{
+    config::Config,
+    provenance::Provenance,
+    run_folder::{Recorded, Row},
+};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -9,11 +13,7 @@ use super::{
     files::same,
     replay::{Replay, RowDifference, replay},
 };
-use crate::{
-    args::DiffArgs,
-    provenance::Provenance,
-    run_folder::{Recorded, Row},
-};
+use crate::args::DiffArgs;
 
 /// Two runs.
 #[derive(Debug, Serialize)]

@@ -8,12 +8,15 @@ use std::path::Path;
 use anyhow::Context;
 use card::Card;
 use mackrl_env::matrix_game::MATRIX_GAME;
-use mackrl_run::config::{ConfigBuilder, ConfigError};
+use mackrl_run::{
+    config::{ConfigBuilder, ConfigError},
+    scenario_file::read_scenario,
+};
 use mackrl_skirmish::{Skirmish, SkirmishSettings};
 use row::Row;
 
 use crate::{
-    args::{MapsArgs, read_scenario, world},
+    args::{MapsArgs, world},
     output,
 };
 

@@ -16,8 +16,8 @@ use crate::{
     commands::sc2,
     failure::Failure,
     output,
+    progress::Meter,
     replay::{Opened, Summary, picture},
-    reproduce::Meter,
 };
 
 /// The word that stands for every map.

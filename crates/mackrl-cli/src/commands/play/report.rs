@@ -2,11 +2,13 @@
 
 use std::{fmt::Write as _, fs, path::Path};
 
+use mackrl_run::provenance::CODE;
+
 use anyhow::Context;
 use serde::Serialize;
 
 use super::statistics::Row;
-use crate::{output::write_file, provenance::CODE};
+use crate::output::write_file;
 
 /// Names of the files.
 const DATA: &str = "scripted.json";

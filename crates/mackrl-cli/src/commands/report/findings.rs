@@ -1,12 +1,14 @@
 //! The statistics of a report.
 
+use mackrl_run::provenance::Provenance;
+
 use mackrl::statistics::{
     Aggregate, Bootstrap, Crossings, Interval, mean_and_standard_error, probability_of_improvement,
 };
 use serde::Serialize;
 
 use super::scores::{Cell, Scores};
-use crate::{args::ReportArgs, provenance::Provenance};
+use crate::args::ReportArgs;
 
 /// Levels of a share that curves are asked about.
 const LEVELS: [f64; 3] = [0.5, 0.7, 0.9];

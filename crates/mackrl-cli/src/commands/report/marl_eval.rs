@@ -7,13 +7,12 @@
 
 use std::collections::BTreeMap;
 
+use mackrl_run::recorded::{Grouping, Measurements, RecordedRun};
+
 use anyhow::Context;
 use serde_json::{Value, json};
 
-use crate::{
-    failure::Failure,
-    recorded::{Grouping, Measurements, RecordedRun},
-};
+use crate::failure::Failure;
 
 /// What tests are exported: our name and theirs.
 const METRICS: [(&str, &str); 3] = [
@@ -50,7 +49,7 @@ pub(super) fn experiments(grouping: &Grouping) -> anyhow::Result<Value> {
             .runs
             .iter()
             .map(Tests::read)
-            .collect::<anyhow::Result<_>>()?;
+            .collect::<anyhow::Result<Vec<_>>>()?;
         runs.entry(&series.map)
             .or_default()
             .insert(&series.name, tests);
@@ -78,7 +77,7 @@ impl Tests {
         let columns = METRICS
             .iter()
             .map(|(ours, _)| Measurements::read(run, ours))
-            .collect::<anyhow::Result<_>>()
+            .collect::<mackrl_run::Result<Vec<_>>>()
             .with_context(|| format!("cannot export {}", run.path.display()))?;
         Ok(Self {
             seed: run.config.run.seed,

@@ -5,12 +5,12 @@ mod marl_eval;
 mod scores;
 mod table;
 
-use crate::{
-    args::ReportArgs,
-    output,
+use mackrl_run::{
     recorded::{find, group},
     run_folder,
 };
+
+use crate::{args::ReportArgs, output};
 use findings::Findings;
 use scores::Scores;
 

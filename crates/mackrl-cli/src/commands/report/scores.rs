@@ -1,11 +1,10 @@
 //! One number for each run, and its curve.
 
+use mackrl_run::recorded::{Axis, Grouping, Measurements, Series, final_mean};
+
 use mackrl::statistics::interpolate;
 
-use crate::{
-    failure::Failure,
-    recorded::{Axis, Grouping, Measurements, Series, final_mean},
-};
+use crate::failure::Failure;
 
 /// The runs of an algorithm on a map.
 #[derive(Debug, Clone, PartialEq)]

@@ -16,7 +16,7 @@ use super::{
     play,
     worlds::{StarCraftWorld, settings},
 };
-use crate::{args::RecordArgs, failure::Failure, output, reproduce::Meter};
+use crate::{args::RecordArgs, failure::Failure, output, progress::Meter};
 
 /// Plays, and writes every loop down.
 pub(super) fn run(args: &RecordArgs) -> anyhow::Result<()> {

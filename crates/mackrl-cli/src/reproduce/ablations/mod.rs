@@ -16,7 +16,11 @@ use clap::Args;
 use mackrl::statistics::{
     Aggregate, Bootstrap, Interval, mean_and_standard_error, probability_of_improvement,
 };
-use mackrl_run::config::ConfigBuilder;
+use mackrl_run::{
+    config::ConfigBuilder,
+    provenance::Provenance,
+    recorded::{TrainingRun, final_mean},
+};
 use serde::Serialize;
 use variants::{Variant, variants};
 
@@ -25,11 +29,7 @@ use super::{
     learning::{Curve, Difference, Job, LearningOptions, train_all},
     write,
 };
-use crate::{
-    plot::SmallMultiples,
-    provenance::Provenance,
-    recorded::{TrainingRun, final_mean},
-};
+use crate::plot::SmallMultiples;
 
 /// Show where MACKRL's gain comes from: one plot of nine learners that differ in one thing each.
 ///
@@ -204,6 +204,8 @@ impl Versus {
 
 #[cfg(test)]
 mod tests {
+    use mackrl_run::config::Config;
+
     use super::*;
 
     /// Two runs of each variant: MACKRL ends at 0.8, number n at 0.8 − n/10, all ± 0.05.
@@ -215,7 +217,9 @@ mod tests {
         let runs: Vec<TrainingRun> = (0..variants.len())
             .flat_map(|number| {
                 let end = 0.8 - number as f64 / 10.0;
-                [-0.05, 0.05].map(|noise| TrainingRun::of_wins(&[0.0, 0.3, end + noise]))
+                [-0.05, 0.05].map(|noise| {
+                    TrainingRun::new(&Config::default(), vec![0.0, 0.3, end + noise], Vec::new())
+                })
             })
             .collect();
         report("2s3z", &LearningOptions::default(), &variants, &runs)

@@ -22,10 +22,9 @@ use super::{
     figure7,
     figure7::{Figure7Options, Figure7Report},
     learning::LearningOptions,
-    meter::Meter,
     write,
 };
-use crate::plot::LineChart;
+use crate::{plot::LineChart, progress::Meter};
 use page::Section;
 
 /// The page's name.

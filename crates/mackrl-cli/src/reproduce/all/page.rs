@@ -1,7 +1,8 @@
 //! The report as one HTML page that needs no other file.
 
 use super::Claim;
-use crate::{provenance::CODE, reproduce::ClaimSource};
+use crate::reproduce::ClaimSource;
+use mackrl_run::provenance::CODE;
 
 const STYLE: &str = include_str!("page.css");
 

@@ -4,9 +4,10 @@ use std::{num::NonZeroUsize, path::PathBuf, sync::Arc, thread};
 
 use clap::{Args, ValueEnum, builder::RangedU64ValueParser};
 use mackrl_env::matrix_game::{MatrixGameKind, ObservationDistribution, Payoffs};
-use mackrl_run::config::EnvironmentConfig;
-
-use crate::provenance::{Choice, Judgement, Provenance};
+use mackrl_run::{
+    config::EnvironmentConfig,
+    provenance::{Choice, Judgement, Provenance},
+};
 
 /// Reproduce Figure 5: MACKRL, independent learners and a joint learner on the matrix game.
 ///

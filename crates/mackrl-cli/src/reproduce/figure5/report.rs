@@ -2,10 +2,11 @@
 
 use mackrl::tabular::{Curve, Learner, Optima, Run, Sweep};
 use mackrl_env::matrix_game::{CommonKnowledge, ObservationDistribution, Payoffs};
+use mackrl_run::provenance::Provenance;
 use serde::{Deserialize, Serialize};
 
 use super::{claims::claims, findings::Findings, options::Figure5Options};
-use crate::{provenance::Provenance, reproduce::Claim};
+use crate::reproduce::Claim;
 
 /// Figure 5 in numbers.
 ///

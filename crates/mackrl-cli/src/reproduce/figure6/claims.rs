@@ -1,12 +1,10 @@
 //! The paper's claims about Figure 6 and our own aims, each with the rule by which it is judged.
 
 use mackrl::statistics::{Aggregate, Bootstrap, Interval, mean};
+use mackrl_run::recorded::{TrainingRun, final_mean, share_of};
 
 use super::MapRuns;
-use crate::{
-    recorded::{TrainingRun, final_mean, share_of},
-    reproduce::{Claim, ClaimSource, learning::Difference},
-};
+use crate::reproduce::{Claim, ClaimSource, learning::Difference};
 
 /// Share of the tests at the beginning of training that "initially" means.
 const INITIAL_SHARE: f64 = 0.1;
@@ -165,6 +163,8 @@ fn initials(runs: &[TrainingRun]) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
+    use mackrl_run::config::Config;
+
     use super::*;
 
     /// Two runs, of ten tests each, that win `middle` up to two fifths of the training and `end` from there on, give or take 0.01.
@@ -173,7 +173,7 @@ mod tests {
             let won: Vec<f64> = (1..=10)
                 .map(|test| noise + if test <= 4 { middle } else { end })
                 .collect();
-            TrainingRun::of_wins(&won)
+            TrainingRun::new(&Config::default(), won, Vec::new())
         };
         vec![run(-0.01), run(0.01)]
     }

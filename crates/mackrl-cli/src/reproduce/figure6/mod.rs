@@ -13,6 +13,7 @@ use std::fs;
 
 use anyhow::Context as _;
 use clap::Args;
+use mackrl_run::{provenance::Provenance, recorded::TrainingRun};
 use serde::Serialize;
 
 use super::{
@@ -20,7 +21,7 @@ use super::{
     learning::{Curve, Job, Learner, LearningOptions, train_all},
     write,
 };
-use crate::{plot::LineChart, provenance::Provenance, recorded::TrainingRun};
+use crate::plot::LineChart;
 use published::Published;
 
 /// Maps of the figure.

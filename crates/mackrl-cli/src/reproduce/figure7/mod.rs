@@ -12,6 +12,7 @@ use std::fs;
 use anyhow::Context as _;
 use clap::Args;
 use mackrl::statistics::mean_and_standard_error;
+use mackrl_run::{provenance::Provenance, recorded::TrainingRun};
 use serde::Serialize;
 
 use super::{
@@ -19,7 +20,7 @@ use super::{
     learning::{Job, Learner, LearningOptions, train_all},
     write,
 };
-use crate::{plot::LineChart, provenance::Provenance, recorded::TrainingRun};
+use crate::plot::LineChart;
 
 /// Enemies on the map.
 const ENEMIES: usize = 5;

@@ -10,12 +10,9 @@ mod curve;
 mod options;
 mod run;
 
-use crate::{
-    failure::Failure,
-    recorded::TrainingRun,
-    signals::StopRequest,
-    sweep::{Entry, make_all},
-};
+use mackrl_run::{recorded::TrainingRun, sweep::Entry};
+
+use crate::{commands::resume::make_all, failure::Failure, signals};
 pub(crate) use curve::{Curve, Difference};
 pub(crate) use options::LearningOptions;
 pub(crate) use run::{Job, Learner};
@@ -36,7 +33,7 @@ pub(crate) fn train_all(
     let entries: Vec<Entry> = (missing.iter())
         .map(|&job| jobs[job].entry(options))
         .collect::<anyhow::Result<_>>()?;
-    let outcome = make_all(&entries, options.jobs(), &StopRequest::listen()?)?;
+    let outcome = make_all(&entries, options.jobs(), &signals::listen()?)?;
     if let Some((name, reason)) = outcome.failed.first() {
         let message = format!(
             "{} of {} runs failed, the first of them {name}: {reason}",

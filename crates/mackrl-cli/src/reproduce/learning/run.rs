@@ -3,17 +3,16 @@
 use std::{fs, path::Path};
 
 use anyhow::Context as _;
-use mackrl_run::config::{Config, ConfigBuilder};
+use mackrl_run::{
+    config::{Config, ConfigBuilder},
+    provenance::CODE,
+    recorded::{KEPT, TRAINING, TrainingRun},
+    sweep::Entry,
+};
 use serde::{Deserialize, Serialize};
 
 use super::LearningOptions;
-use crate::{
-    failure::Failure,
-    provenance::CODE,
-    recorded::{KEPT, TRAINING, TrainingRun},
-    reproduce::write,
-    sweep::Entry,
-};
+use crate::{failure::Failure, reproduce::write};
 
 /// Who learns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -80,8 +79,12 @@ impl Job {
         };
         let provenance = run.provenance();
         if provenance.code != CODE && !options.any_code {
-            let code = provenance.code.clone();
-            return Err(Failure::OtherCode { path, code }.into());
+            let message = format!(
+                "{} was made by code {}, expected {CODE}",
+                path.display(),
+                provenance.code
+            );
+            return Err(Failure::OtherCode { message }.into());
         }
         Ok(Some(run))
     }

@@ -7,10 +7,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use anyhow::Context;
-
 use super::{KEPT, RecordedRun, TRAINING};
-use crate::{failure::Failure, run_folder};
+use crate::{
+    error::{Context, Result, RunError},
+    run_folder,
+};
 
 /// How far below a named folder runs are looked for.
 const DEPTH_MAX: usize = 5;
@@ -21,7 +22,7 @@ const RUNS_MAX: usize = 10_000;
 ///
 /// # Errors
 /// If there is none at one of the paths, or one cannot be read.
-pub(crate) fn find(paths: &[PathBuf]) -> anyhow::Result<Vec<RecordedRun>> {
+pub fn find(paths: &[PathBuf]) -> Result<Vec<RecordedRun>> {
     let mut found = BTreeSet::new();
     for path in paths {
         let before = found.len();
@@ -31,7 +32,7 @@ pub(crate) fn find(paths: &[PathBuf]) -> anyhow::Result<Vec<RecordedRun>> {
         collect(path, &canonical, DEPTH_MAX, &mut here)?;
         if here.is_empty() {
             let message = format!("there is no run in or below {}", path.display());
-            return Err(Failure::Usage { message }.into());
+            return Err(RunError::Selection { message });
         }
         found.extend(here);
         debug_assert!(found.len() >= before, "nothing is forgotten");
@@ -55,7 +56,7 @@ fn collect(
     canonical: &Path,
     depth: usize,
     found: &mut BTreeSet<(PathBuf, PathBuf)>,
-) -> anyhow::Result<()> {
+) -> Result<()> {
     if run_folder::is_run(canonical) || is_kept(canonical) {
         if !found.iter().any(|(real, _)| real == canonical) {
             found.insert((canonical.to_owned(), shown.to_owned()));
@@ -65,7 +66,7 @@ fn collect(
                 "there are more than {RUNS_MAX} runs below {}",
                 shown.display()
             );
-            return Err(Failure::Usage { message }.into());
+            return Err(RunError::Selection { message });
         }
         return Ok(());
     }
@@ -120,7 +121,7 @@ mod tests {
     #[test]
     fn kept_runs_are_found_once_and_their_folders_passed_over() {
         let folder = tempfile::tempdir().unwrap();
-        let config = mackrl_run::config::Config::default().to_toml();
+        let config = crate::config::Config::default().to_toml();
         for name in [
             "training/3m-mackrl-seed1",
             "training/3m-mackrl-seed2",
@@ -132,7 +133,11 @@ mod tests {
         for name in ["training/3m-mackrl-seed1", "training/3m-mackrl-seed2"] {
             fs::write(folder.path().join(name).join("config.toml"), &config).unwrap();
         }
-        let kept = serde_json::to_string(&crate::recorded::TrainingRun::of_wins(&[0.0, 0.5]));
+        let kept = serde_json::to_string(&crate::recorded::TrainingRun::new(
+            &crate::config::Config::default(),
+            vec![0.0, 0.5],
+            Vec::new(),
+        ));
         fs::write(
             folder.path().join("runs/3m-mackrl-seed1.json"),
             kept.unwrap(),

@@ -11,13 +11,13 @@
 //!
 //! Nothing in it depends on the clock, the machine, the folder or the number of threads: equal work has an equal provenance.
 
-use mackrl_run::config::{Config, EnvironmentConfig};
+use crate::config::{Config, EnvironmentConfig};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 /// The version of the code that results come from: the crates' version and the first digits of the hash of the libraries'
 /// sources and data (see `build.rs`).
-pub(crate) const CODE: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("MACKRL_SOURCE"));
+pub const CODE: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("MACKRL_SOURCE"));
 
 /// [`Provenance::code`] of results that do not say.
 const UNKNOWN: &str = "unknown";
@@ -27,40 +27,40 @@ const ID_DIGITS: usize = 16;
 
 /// Where a result comes from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Provenance {
+pub struct Provenance {
     /// Names this provenance: the first 16 digits of the SHA-256 of all that follows.
-    pub(crate) id: String,
+    pub id: String,
     /// [`CODE`] of the program that made the result.
-    pub(crate) code: String,
+    pub code: String,
     /// The map's name.
-    pub(crate) map: String,
+    pub map: String,
     /// SHA-256 of the map's file and the unit statistics it is played with: `cat maps/3m.toml units/liberty.toml | sha256sum`.
-    pub(crate) map_sha256: String,
+    pub map_sha256: String,
     /// SHA-256 of the configuration without its seed, equal for the repetitions of an experiment:
     /// `grep -v '^seed = ' config.toml | sha256sum`.
-    pub(crate) config_sha256: String,
+    pub config_sha256: String,
     /// The seeds of the runs in the result, or of the episodes if only episodes were played.
-    pub(crate) seeds: Vec<u64>,
+    pub seeds: Vec<u64>,
     /// How the team was judged.
-    pub(crate) evaluation: Judgement,
+    pub evaluation: Judgement,
     /// SHA-256 of the weights that played, if the result is about given weights.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) weights_sha256: Option<String>,
+    pub weights_sha256: Option<String>,
 }
 
 /// How a team is judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Judgement {
+pub struct Judgement {
     /// How actions are chosen.
-    pub(crate) actions: Choice,
+    pub actions: Choice,
     /// Episodes of a judgement; 0 if expectations are computed and none is played.
-    pub(crate) episodes: usize,
+    pub episodes: usize,
 }
 
 /// How actions are chosen when a team is judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(crate) enum Choice {
+pub enum Choice {
     /// The most likely ones.
     Greedy,
     /// Sampled in some episodes, greedy in as many others.
@@ -71,7 +71,7 @@ pub(crate) enum Choice {
 
 impl Provenance {
     /// Of a training run: judged by its greedy tests.
-    pub(crate) fn of_run(config: &Config) -> Self {
+    pub fn of_run(config: &Config) -> Self {
         let judgement = Judgement {
             actions: Choice::Greedy,
             episodes: config.test.episodes,
@@ -85,7 +85,7 @@ impl Provenance {
     }
 
     /// Of a training run by a version of the code that is not known.
-    pub(crate) fn of_unknown_code(config: &Config) -> Self {
+    pub fn of_unknown_code(config: &Config) -> Self {
         let provenance = Self {
             code: UNKNOWN.to_owned(),
             ..Self::of_run(config)
@@ -94,7 +94,7 @@ impl Provenance {
     }
 
     /// Of results taken together: one for each experiment, with the seeds of all its repetitions.
-    pub(crate) fn merged<'a>(of: impl IntoIterator<Item = &'a Self>) -> Vec<Self> {
+    pub fn merged<'a>(of: impl IntoIterator<Item = &'a Self>) -> Vec<Self> {
         let mut experiments: Vec<Self> = Vec::new();
         for one in of {
             let same = |other: &&mut Self| one.differences(other).is_empty();
@@ -107,12 +107,7 @@ impl Provenance {
     }
 
     /// Of episodes that these weights played, drawn from `seed`.
-    pub(crate) fn of_weights(
-        config: &Config,
-        weights: &[u8],
-        seed: u64,
-        judgement: Judgement,
-    ) -> Self {
+    pub fn of_weights(config: &Config, weights: &[u8], seed: u64, judgement: Judgement) -> Self {
         let mut provenance = Self::of_run(config);
         provenance.seeds = vec![seed];
         provenance.evaluation = judgement;
@@ -121,7 +116,7 @@ impl Provenance {
     }
 
     /// Of work in the world `env` that `settings` describe in words of their own.
-    pub(crate) fn new(
+    pub fn new(
         env: &EnvironmentConfig,
         settings: &str,
         seeds: Vec<u64>,
@@ -141,7 +136,7 @@ impl Provenance {
     }
 
     /// What makes this another experiment than `other`: the names of the fields that differ, seeds and weights aside.
-    pub(crate) fn differences(&self, other: &Self) -> Vec<&'static str> {
+    pub fn differences(&self, other: &Self) -> Vec<&'static str> {
         let fields = [
             ("code", self.code != other.code),
             (
@@ -171,12 +166,12 @@ fn without_seed(config: &Config) -> String {
 }
 
 /// SHA-256 in hexadecimal, as `sha256sum` prints it.
-pub(crate) fn sha256(content: &[u8]) -> String {
+pub fn sha256(content: &[u8]) -> String {
     hexadecimal(&Sha256::digest(content))
 }
 
 /// Two digits for each byte.
-pub(crate) fn hexadecimal(bytes: &[u8]) -> String {
+pub fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 

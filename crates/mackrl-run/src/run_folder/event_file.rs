@@ -13,7 +13,7 @@ use std::{
     time::SystemTime,
 };
 
-use anyhow::Context;
+use crate::error::{Context, Result, RunError};
 use serde_json::{Map, Value};
 
 use super::disk::{Disk, cannot, cannot_write};
@@ -49,7 +49,7 @@ impl EventFile {
     ///
     /// # Errors
     /// Path, bytes and what the operating system says.
-    pub(super) fn create(disk: &dyn Disk, run: &Path, steps_env: u64) -> anyhow::Result<Self> {
+    pub(super) fn create(disk: &dyn Disk, run: &Path, steps_env: u64) -> Result<Self> {
         let wall_s = wall_s();
         let name = format!(
             "events.out.tfevents.{wall_s:010.0}.mackrl.{}.0",
@@ -75,12 +75,15 @@ impl EventFile {
     ///
     /// # Errors
     /// Path, bytes and what the operating system says.
-    pub(super) fn append(&mut self, disk: &dyn Disk, row: &str) -> anyhow::Result<()> {
-        let row: Map<String, Value> = serde_json::from_str(row)?;
+    pub(super) fn append(&mut self, disk: &dyn Disk, row: &str) -> Result<()> {
+        let row: Map<String, Value> =
+            serde_json::from_str(row).map_err(|error| RunError::BadData {
+                message: format!("a row of metrics is not a JSON object: {error}"),
+            })?;
         self.write(disk, &record(&scalars(wall_s(), &row)))
     }
 
-    fn write(&mut self, disk: &dyn Disk, bytes: &[u8]) -> anyhow::Result<()> {
+    fn write(&mut self, disk: &dyn Disk, bytes: &[u8]) -> Result<()> {
         disk.write(&mut self.file, bytes)
             .with_context(|| cannot_write(&self.path, bytes.len()))
     }

@@ -12,7 +12,7 @@ run.steps_env = 1000
 "test.episodes" = 7
 "#;
 
-fn parse(text: &str) -> anyhow::Result<Plan> {
+fn parse(text: &str) -> Result<Plan> {
     Plan::parse("plan.toml", text, None, Path::new("runs/plan"))
 }
 

@@ -1,6 +1,6 @@
 //! Gives the program the hash of the code that its results come from.
 //!
-//! What is hashed are the sources of the two libraries and the data that they embed: files of tests, and this crate, change no
+//! What is hashed are the sources of the libraries and the data that they embed: files of tests, and the program, change no
 //! result. A commit's name would need git at build time, would say nothing of changes that are not committed, and would have
 //! this crate built anew after every commit.
 

@@ -16,16 +16,18 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use anyhow::Context;
-use mackrl_run::training::Checkpoint;
-
 use super::{
     CHECKPOINTS, CONFIG, METRICS,
     disk::{self, Disk, cannot},
     manifest::{FORMAT, Fingerprint, Growing, Manifest},
     untrusted,
 };
-use crate::{bounded, failure::Failure, provenance::CODE};
+use crate::{
+    bounded,
+    error::{Context, Result, RunError},
+    provenance::CODE,
+    training::Checkpoint,
+};
 
 pub(super) const TENSORS: &str = "tensors.safetensors";
 pub(super) const COUNTERS: &str = "counters.json";
@@ -61,7 +63,7 @@ pub(super) fn write(
     (number, checkpoint): (u64, &Checkpoint),
     surroundings: Surroundings,
     kept: usize,
-) -> anyhow::Result<()> {
+) -> Result<()> {
     let place = place(run, number);
     if !place.exists() {
         create_parent(disk, &place)?;
@@ -75,7 +77,7 @@ pub(super) fn write(
 }
 
 /// Makes the folder that `place` is to lie in, unless it is there.
-pub(super) fn create_parent(disk: &dyn Disk, place: &Path) -> anyhow::Result<()> {
+pub(super) fn create_parent(disk: &dyn Disk, place: &Path) -> Result<()> {
     let parent = parent(place);
     if parent.exists() {
         return Ok(());
@@ -99,7 +101,7 @@ pub(super) fn make(
     place: &Path,
     contents: &[(&str, &[u8])],
     Surroundings { config, metrics }: Surroundings,
-) -> anyhow::Result<()> {
+) -> Result<()> {
     let manifest = Manifest {
         format: FORMAT,
         code: CODE.to_owned(),
@@ -110,7 +112,7 @@ pub(super) fn make(
             .map(|(name, content)| ((*name).to_owned(), Fingerprint::of(content)))
             .collect(),
     };
-    let manifest = serde_json::to_string_pretty(&manifest)? + "\n";
+    let manifest = serde_json::to_string_pretty(&manifest).expect("hashes can be written") + "\n";
     let temporary = disk::temporary(place);
     disk.create_folder(&temporary)
         .with_context(|| cannot("create", &temporary))?;
@@ -123,7 +125,7 @@ pub(super) fn make(
     disk::sync_folder(disk, &parent(place))
 }
 
-fn remove(disk: &dyn Disk, run: &Path, number: u64) -> anyhow::Result<()> {
+fn remove(disk: &dyn Disk, run: &Path, number: u64) -> Result<()> {
     let place = place(run, number);
     let temporary = disk::temporary(&place);
     disk::rename(disk, &place, &temporary)?;
@@ -135,18 +137,16 @@ fn remove(disk: &dyn Disk, run: &Path, number: u64) -> anyhow::Result<()> {
 /// are expected to have at most `tensors_max` bytes.
 ///
 /// # Errors
-/// [`Failure::BadData`] if there are checkpoints and none can be used.
-pub(super) fn latest(
-    run: &Path,
-    tensors_max: usize,
-) -> anyhow::Result<(Option<Stored>, Vec<String>)> {
+/// [`RunError::BadData`] if there are checkpoints and none can be used.
+pub(super) fn latest(run: &Path, tensors_max: usize) -> Result<(Option<Stored>, Vec<String>)> {
     let mut wrong = Vec::new();
     for number in numbers(run)?.into_iter().rev() {
         match read(run, number, tensors_max) {
             Ok(stored) => return Ok((Some(stored), wrong)),
             Err(error) => wrong.push(format!(
-                "{} is damaged: {error:#}",
-                place(run, number).display()
+                "{} is damaged: {}",
+                place(run, number).display(),
+                error.chain()
             )),
         }
     }
@@ -154,11 +154,11 @@ pub(super) fn latest(
         return Ok((None, wrong));
     }
     let message = wrong.join("; ");
-    Err(Failure::BadData { message }.into())
+    Err(RunError::BadData { message })
 }
 
 /// Removes what is not complete, and every checkpoint after the one with this number.
-pub(super) fn tidy(disk: &dyn Disk, run: &Path, latest: Option<u64>) -> anyhow::Result<()> {
+pub(super) fn tidy(disk: &dyn Disk, run: &Path, latest: Option<u64>) -> Result<()> {
     for number in numbers(run)? {
         if latest.is_some_and(|latest| number > latest) {
             remove(disk, run, number)?;
@@ -180,31 +180,40 @@ pub(super) fn weights_path(run: &Path, number: u64) -> PathBuf {
 }
 
 /// Reads a checkpoint, and compares everything with its manifest.
-fn read(run: &Path, number: u64, tensors_max: usize) -> anyhow::Result<Stored> {
+fn read(run: &Path, number: u64, tensors_max: usize) -> Result<Stored> {
     let folder = place(run, number);
     let manifest = bounded::read(&folder.join(MANIFEST), untrusted::TEXT_MAX)?;
-    let manifest: Manifest = serde_json::from_slice(&manifest)
-        .with_context(|| cannot("understand", &folder.join(MANIFEST)))?;
-    anyhow::ensure!(
-        manifest.format == FORMAT,
-        "{} has format {}, expected {FORMAT}",
-        folder.join(MANIFEST).display(),
-        manifest.format
-    );
-    let differs = |path: &Path| format!("{} is not what {MANIFEST} says", path.display());
+    let manifest: Manifest =
+        serde_json::from_slice(&manifest).map_err(|error| RunError::BadData {
+            message: format!("{}: {error}", cannot("understand", &folder.join(MANIFEST))),
+        })?;
+    if manifest.format != FORMAT {
+        let message = format!(
+            "{} has format {}, expected {FORMAT}",
+            folder.join(MANIFEST).display(),
+            manifest.format
+        );
+        return Err(RunError::BadData { message });
+    }
+    let differs = |path: &Path| RunError::BadData {
+        message: format!("{} is not what {MANIFEST} says", path.display()),
+    };
     let own = |name: &str, length_max| {
         let path = folder.join(name);
         let content = bounded::read(&path, length_max)?;
         let same = manifest.files.get(name) == Some(&Fingerprint::of(&content));
-        anyhow::ensure!(same, differs(&path));
-        Ok(content)
+        if same {
+            Ok(content)
+        } else {
+            Err(differs(&path))
+        }
     };
     let beginning = |name: &str, fingerprint: &Fingerprint| {
         let path = run.join(name);
         let file = fs::File::open(&path).with_context(|| cannot("read", &path))?;
         let begins = fingerprint.begins(file);
         let begins = begins.with_context(|| cannot("read", &path))?;
-        begins.with_context(|| differs(&path))
+        begins.ok_or_else(|| differs(&path))
     };
     beginning(CONFIG, &manifest.config)?;
     Ok(Stored {
@@ -226,7 +235,7 @@ fn parent(place: &Path) -> PathBuf {
 }
 
 /// The numbers of all checkpoints, in order.
-fn numbers(run: &Path) -> anyhow::Result<Vec<u64>> {
+fn numbers(run: &Path) -> Result<Vec<u64>> {
     let names = names(run)?;
     let whole = names.iter().filter(|name| name.len() == DIGITS);
     let mut numbers: Vec<u64> = whole.filter_map(|name| name.parse().ok()).collect();
@@ -235,7 +244,7 @@ fn numbers(run: &Path) -> anyhow::Result<Vec<u64>> {
 }
 
 /// What lies among the checkpoints.
-fn names(run: &Path) -> anyhow::Result<Vec<String>> {
+fn names(run: &Path) -> Result<Vec<String>> {
     let folder = run.join(CHECKPOINTS);
     let entries = match fs::read_dir(&folder) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),

@@ -4,37 +4,36 @@
 //! the sweep or the machine stops, and so that a batch system can make single runs elsewhere. What is done is not a
 //! separate ledger but the run folders themselves. The figures of the paper make their runs in the same way.
 
-mod display;
 mod engine;
 mod plan;
 
 use std::path::PathBuf;
 
-use mackrl_run::config::Config;
 use serde::Serialize;
 
 use crate::{
-    failure::Failure,
+    config::Config,
+    error::{Result, RunError},
     run_folder::{self, LatestRow, RunFolder, Status},
 };
-pub(crate) use engine::{Outcome, make_all};
-pub(crate) use plan::Plan;
+pub use engine::{Observer, Outcome, make_all};
+pub use plan::Plan;
 
 /// One run of a sweep.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Entry {
+pub struct Entry {
     /// Says what is different about it; the name of its folder.
-    pub(crate) name: String,
+    pub name: String,
     /// Its run folder.
-    pub(crate) folder: PathBuf,
+    pub folder: PathBuf,
     /// Everything that determines its result.
-    pub(crate) config: Config,
+    pub config: Config,
 }
 
 /// How a run stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub(crate) enum State {
+pub enum State {
     /// Not begun.
     Waiting,
     /// Begun and not finished, and no process makes it now.
@@ -49,7 +48,7 @@ pub(crate) enum State {
 
 impl State {
     /// As it is printed.
-    pub(crate) const fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Waiting => "waiting",
             Self::Stopped => "stopped",
@@ -64,8 +63,8 @@ impl Entry {
     /// How the run stands.
     ///
     /// # Errors
-    /// [`Failure::OtherConfiguration`] if the folder holds a run with another configuration.
-    pub(crate) fn state(&self) -> anyhow::Result<State> {
+    /// [`RunError::OtherConfiguration`] if the folder holds a run with another configuration.
+    pub fn state(&self) -> Result<State> {
         if !run_folder::is_run(&self.folder) {
             RunFolder::check_free(&self.folder)?;
             return Ok(State::Waiting);
@@ -73,7 +72,7 @@ impl Entry {
         let (config, description) = run_folder::read_description(&self.folder)?;
         if let Some(key) = self.first_difference(&config) {
             let folder = self.folder.clone();
-            return Err(Failure::OtherConfiguration { folder, key }.into());
+            return Err(RunError::OtherConfiguration { folder, key });
         }
         Ok(match description.status {
             Status::Finished => State::Finished,
@@ -94,7 +93,7 @@ impl Entry {
     ///
     /// # Errors
     /// If the folder cannot be made.
-    pub(crate) fn prepare(&self) -> anyhow::Result<()> {
+    pub fn prepare(&self) -> Result<()> {
         if run_folder::is_run(&self.folder) {
             return Ok(());
         }
@@ -102,7 +101,7 @@ impl Entry {
     }
 
     /// What the run last wrote down.
-    pub(crate) fn latest(&self) -> LatestRow {
+    pub fn latest(&self) -> LatestRow {
         run_folder::latest_row(&self.folder)
     }
 }

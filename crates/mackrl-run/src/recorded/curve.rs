@@ -6,14 +6,15 @@ use std::{
     io::{BufRead, BufReader, Read},
 };
 
-use anyhow::Context;
-use clap::ValueEnum;
 use mackrl::statistics::mean;
-use mackrl_run::config::nearest;
 use serde_json::Value;
 
 use super::RecordedRun;
-use crate::{failure::Failure, run_folder};
+use crate::{
+    config::nearest,
+    error::{Context, Result, RunError},
+    run_folder,
+};
 
 /// Longest row of metrics that is read.
 const ROW_LENGTH_MAX: u64 = 1 << 20;
@@ -21,8 +22,8 @@ const ROW_LENGTH_MAX: u64 = 1 << 20;
 const FINAL_SHARE: f64 = 0.1;
 
 /// What a curve is drawn over.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Axis {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Axis {
     /// Environment steps, summed over the parallel environments.
     Steps,
     /// Seconds of training and testing, pauses left out: what sys/sps says, added up.
@@ -31,25 +32,25 @@ pub(crate) enum Axis {
 
 /// One metric of one run.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct Measurements {
+pub struct Measurements {
     /// Environment steps so far.
-    pub(crate) steps: Vec<f64>,
+    pub steps: Vec<f64>,
     /// Seconds so far.
-    pub(crate) wall_s: Vec<f64>,
+    pub wall_s: Vec<f64>,
     /// The metric.
-    pub(crate) values: Vec<f64>,
+    pub values: Vec<f64>,
 }
 
 impl Measurements {
     /// Reads the `metric` of a run.
     ///
     /// # Errors
-    /// If the metrics cannot be read; [`Failure::MissingMetric`] if no row has the metric.
-    pub(crate) fn read(run: &RecordedRun, metric: &str) -> anyhow::Result<Self> {
+    /// If the metrics cannot be read; [`RunError::MissingMetric`] if no row has the metric.
+    pub fn read(run: &RecordedRun, metric: &str) -> Result<Self> {
         if let Some(kept) = &run.kept {
             return kept.measurements(metric, &run.config).ok_or_else(|| {
                 let message = format!("{} keeps no metric `{metric}`", run.path.display());
-                Failure::MissingMetric { message }.into()
+                RunError::MissingMetric { message }
             });
         }
         let path = run.path.join(run_folder::METRICS);
@@ -68,7 +69,7 @@ impl Measurements {
                 break;
             }
             let row: BTreeMap<String, Value> =
-                serde_json::from_slice(&line).map_err(|error| Failure::BadData {
+                serde_json::from_slice(&line).map_err(|error| RunError::BadData {
                     message: format!("{name}: row {number} is not a JSON object: {error}"),
                 })?;
             reading.note(row, metric);
@@ -79,13 +80,13 @@ impl Measurements {
             let suggestion =
                 suggestion.map_or_else(String::new, |name| format!(", did you mean `{name}`?"));
             let message = format!("{name} has no metric `{metric}`{suggestion}");
-            return Err(Failure::MissingMetric { message }.into());
+            return Err(RunError::MissingMetric { message });
         }
         Ok(found)
     }
 
     /// The curve: (x, y) in ascending order of x.
-    pub(crate) fn over(&self, axis: Axis) -> Vec<[f64; 2]> {
+    pub fn over(&self, axis: Axis) -> Vec<[f64; 2]> {
         let places = match axis {
             Axis::Steps => &self.steps,
             Axis::WallClock => &self.wall_s,
@@ -122,12 +123,12 @@ impl Reading {
 }
 
 /// The mean of the last tenth of a run's tests, at least one of them: one test of few episodes says little.
-pub(crate) fn final_mean(values: &[f64]) -> f64 {
+pub fn final_mean(values: &[f64]) -> f64 {
     mean(&values[values.len() - share_of(values.len(), FINAL_SHARE)..])
 }
 
 /// A share of `count`, rounded up: at least one if there is one.
-pub(crate) fn share_of(count: usize, share: f64) -> usize {
+pub fn share_of(count: usize, share: f64) -> usize {
     (1..=count)
         .find(|&part| part as f64 >= share * count as f64)
         .unwrap_or(count)

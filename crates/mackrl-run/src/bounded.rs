@@ -8,16 +8,14 @@ use std::{
     path::Path,
 };
 
-use anyhow::Context;
-
-use crate::failure::Failure;
+use crate::error::{Context, Result, RunError};
 
 /// The content of a file of at most `length_max` bytes.
 ///
 /// # Errors
-/// What the operating system says, an error of the same kind for what is no regular file, or [`Failure::BadData`] if there is
+/// What the operating system says, an error of the same kind for what is no regular file, or [`RunError::BadData`] if there is
 /// more.
-pub(crate) fn read(path: &Path, length_max: usize) -> anyhow::Result<Vec<u8>> {
+pub fn read(path: &Path, length_max: usize) -> Result<Vec<u8>> {
     let cannot = || format!("cannot read {}", path.display());
     let kind = fs::metadata(path).with_context(cannot)?.file_type();
     if !kind.is_file() {
@@ -34,7 +32,7 @@ pub(crate) fn read(path: &Path, length_max: usize) -> anyhow::Result<Vec<u8>> {
             "{} is too long, expected at most {length_max} bytes",
             path.display()
         );
-        return Err(Failure::BadData { message }.into());
+        return Err(RunError::BadData { message });
     }
     Ok(bytes)
 }
@@ -42,15 +40,20 @@ pub(crate) fn read(path: &Path, length_max: usize) -> anyhow::Result<Vec<u8>> {
 /// The text of a file of at most `length_max` bytes.
 ///
 /// # Errors
-/// As [`read`], and [`Failure::BadData`] if it is not UTF-8.
-pub(crate) fn read_text(path: &Path, length_max: usize) -> anyhow::Result<String> {
-    String::from_utf8(read(path, length_max)?).map_err(|error| {
-        let message = format!(
-            "{}: not UTF-8 text at byte {}",
-            path.display(),
-            error.utf8_error().valid_up_to()
-        );
-        Failure::BadData { message }.into()
+/// As [`read`], and [`RunError::BadData`] if it is not UTF-8.
+pub fn read_text(path: &Path, length_max: usize) -> Result<String> {
+    text(&path.display().to_string(), read(path, length_max)?)
+        .map_err(|message| RunError::BadData { message })
+}
+
+/// These bytes of the file called `name` as text, or what is wrong with them.
+///
+/// # Errors
+/// Where they are not UTF-8, in words.
+pub fn text(name: &str, bytes: Vec<u8>) -> Result<String, String> {
+    String::from_utf8(bytes).map_err(|error| {
+        let at = error.utf8_error().valid_up_to();
+        format!("{name}: not UTF-8 text at byte {at}")
     })
 }
 
@@ -84,7 +87,7 @@ mod tests {
     #[test]
     fn what_is_no_file_is_refused_before_it_is_opened() {
         let folder = tempfile::tempdir().unwrap();
-        let refused = |path: &Path| format!("{:#}", read(path, 11).unwrap_err());
+        let refused = |path: &Path| read(path, 11).unwrap_err().chain();
         assert!(refused(folder.path()).ends_with("it is a folder, expected a file"));
         if cfg!(unix) {
             let endless = refused(Path::new("/dev/zero"));

@@ -13,37 +13,36 @@ mod series;
 
 use std::path::PathBuf;
 
-use anyhow::Context;
-use mackrl_run::config::Config;
-
 use crate::{
+    config::Config,
+    error::{Context, Result},
     provenance::Provenance,
     run_folder::{self, Status},
 };
-pub(crate) use curve::{Axis, Measurements, final_mean, share_of};
-pub(crate) use find::find;
-pub(crate) use grid::Gridded;
-pub(crate) use kept::TrainingRun;
-pub(crate) use series::{Grouping, Selection, Series, group};
+pub use curve::{Axis, Measurements, final_mean, share_of};
+pub use find::find;
+pub use grid::Gridded;
+pub use kept::TrainingRun;
+pub use series::{Grouping, Selection, Series, group};
 
 /// Folder of the files that are kept of the runs of a figure, below the figure's.
-pub(crate) const KEPT: &str = "runs";
+pub const KEPT: &str = "runs";
 /// Folder of the run folders of a figure, below the figure's.
-pub(crate) const TRAINING: &str = "training";
+pub const TRAINING: &str = "training";
 
 /// A run that was made earlier, or is being made.
 #[derive(Debug, Clone)]
-pub(crate) struct RecordedRun {
+pub struct RecordedRun {
     /// Its folder, or its compact file.
-    pub(crate) path: PathBuf,
+    pub path: PathBuf,
     /// Everything that determines its result.
-    pub(crate) config: Config,
+    pub config: Config,
     /// Its curves, if they are kept in a file and not in a folder.
-    pub(crate) kept: Option<TrainingRun>,
+    pub kept: Option<TrainingRun>,
     /// How far it has come.
-    pub(crate) status: Status,
+    pub status: Status,
     /// Where its results come from: one entry for each version of the program that went on with it.
-    pub(crate) provenance: Vec<Provenance>,
+    pub provenance: Vec<Provenance>,
 }
 
 impl RecordedRun {
@@ -51,7 +50,7 @@ impl RecordedRun {
     ///
     /// # Errors
     /// If the folder holds no run, or one with a configuration that this program does not understand.
-    pub(crate) fn open(path: PathBuf) -> anyhow::Result<Self> {
+    pub fn open(path: PathBuf) -> Result<Self> {
         let (config, description) = run_folder::read_description(&path)
             .with_context(|| format!("cannot use {}", path.display()))?;
         Ok(Self {
@@ -67,7 +66,7 @@ impl RecordedRun {
     ///
     /// # Errors
     /// If the file holds no such run.
-    pub(crate) fn open_kept(path: PathBuf) -> anyhow::Result<Self> {
+    pub fn open_kept(path: PathBuf) -> Result<Self> {
         let run = TrainingRun::load(&path)?;
         Ok(Self {
             config: run.config()?,
@@ -79,13 +78,13 @@ impl RecordedRun {
     }
 
     /// Name of what learns, as configurations have it.
-    pub(crate) fn algorithm(&self) -> String {
+    pub fn algorithm(&self) -> String {
         self.config.algorithm.name().to_owned()
     }
 }
 
 /// The value at a key, as it is typed.
-pub(crate) fn setting(config: &Config, key: &str) -> String {
+pub fn setting(config: &Config, key: &str) -> String {
     match config.get(key) {
         Some(toml::Value::String(text)) => text,
         Some(value) => value.to_string(),

@@ -1,5 +1,6 @@
 //! Curves of several runs at common places.
 
+use crate::error::Result;
 use mackrl::statistics::interpolate;
 
 use super::{Axis, Measurements, Series};
@@ -9,11 +10,11 @@ const PLACES: usize = 200;
 
 /// The runs of a series at common places.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Gridded {
+pub struct Gridded {
     /// Where, in ascending order.
-    pub(crate) places: Vec<f64>,
+    pub places: Vec<f64>,
     /// For each place, the height of each run's curve.
-    pub(crate) heights: Vec<Vec<f64>>,
+    pub heights: Vec<Vec<f64>>,
 }
 
 impl Gridded {
@@ -22,10 +23,10 @@ impl Gridded {
     ///
     /// # Errors
     /// If a run cannot be read.
-    pub(crate) fn read(series: &Series, metric: &str, axis: Axis) -> anyhow::Result<Self> {
+    pub fn read(series: &Series, metric: &str, axis: Axis) -> Result<Self> {
         let curves = (series.runs.iter())
             .map(|run| Ok(Measurements::read(run, metric)?.over(axis)))
-            .collect::<anyhow::Result<Vec<_>>>()?;
+            .collect::<Result<Vec<_>>>()?;
         let interval = match axis {
             Axis::Steps => series.interval(metric),
             Axis::WallClock => shortest(&curves) / PLACES as f64,
@@ -59,8 +60,8 @@ impl Gridded {
 
 impl Series {
     /// Environment steps between two numbers of a metric.
-    pub(crate) fn interval(&self, metric: &str) -> f64 {
-        let interval = |config: &mackrl_run::config::Config| match metric.starts_with("test_") {
+    pub fn interval(&self, metric: &str) -> f64 {
+        let interval = |config: &crate::config::Config| match metric.starts_with("test_") {
             true => config.test.interval_steps_env,
             false => config.run.metrics_interval_steps_env,
         };

@@ -8,7 +8,7 @@ use std::{
     rc::Rc,
 };
 
-use mackrl_run::training::Trainer;
+use crate::training::Trainer;
 
 use super::*;
 
@@ -111,7 +111,7 @@ fn third_checkpoint_on(
     disk: &FaultyDisk,
     path: &Path,
     checkpoints: &[Checkpoint; 3],
-) -> anyhow::Result<()> {
+) -> Result<()> {
     let mut folder = RunFolder::create(path, &config(), 1).unwrap();
     folder.disk = Box::new(FaultyDisk::sound());
     for (number, checkpoint) in (1..).zip(&checkpoints[..2]) {
@@ -156,10 +156,10 @@ fn no_failing_operation_costs_a_checkpoint() {
 }
 
 /// The message names the path, and leads to exit code 74 by its cause.
-fn assert_is_told(error: &anyhow::Error, path: &Path) {
-    let message = format!("{error:#}");
+fn assert_is_told(error: &RunError, path: &Path) {
+    let message = error.chain();
     assert!(message.contains(&*path.to_string_lossy()), "{message}");
-    assert!(error.root_cause().is::<io::Error>(), "{message}");
+    assert!(matches!(error, RunError::System { .. }), "{message}");
     assert!(
         !message.contains("write") || message.contains(" bytes)"),
         "{message}"

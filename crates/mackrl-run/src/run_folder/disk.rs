@@ -9,7 +9,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use anyhow::Context;
+use crate::error::{Context, Result};
 
 /// Ending of what is not complete yet, or not needed any more: whoever finds it may remove it.
 pub(super) const TEMPORARY: &str = "tmp";
@@ -65,7 +65,7 @@ impl Disk for RealDisk {
 ///
 /// # Errors
 /// Path, bytes and what the operating system says; the file that was there is intact then.
-pub(super) fn replace(disk: &dyn Disk, path: &Path, content: &[u8]) -> anyhow::Result<()> {
+pub(super) fn replace(disk: &dyn Disk, path: &Path, content: &[u8]) -> Result<()> {
     let temporary = temporary(path);
     let written = write_synced(disk, &temporary, content);
     let renamed = written.and_then(|()| rename(disk, &temporary, path));
@@ -79,7 +79,7 @@ pub(super) fn replace(disk: &dyn Disk, path: &Path, content: &[u8]) -> anyhow::R
 }
 
 /// Writes a file and waits until its content is safe. Its name is safe when its folder has been synced as well.
-pub(super) fn write_synced(disk: &dyn Disk, path: &Path, content: &[u8]) -> anyhow::Result<()> {
+pub(super) fn write_synced(disk: &dyn Disk, path: &Path, content: &[u8]) -> Result<()> {
     let write = || {
         let mut file = disk.create(path)?;
         disk.write(&mut file, content)?;
@@ -89,13 +89,13 @@ pub(super) fn write_synced(disk: &dyn Disk, path: &Path, content: &[u8]) -> anyh
 }
 
 /// Gives a file or a folder another name.
-pub(super) fn rename(disk: &dyn Disk, from: &Path, to: &Path) -> anyhow::Result<()> {
+pub(super) fn rename(disk: &dyn Disk, from: &Path, to: &Path) -> Result<()> {
     disk.rename(from, to)
         .with_context(|| format!("{} to {}", cannot("rename", from), to.display()))
 }
 
 /// Makes the names in a folder safe; only Unix lets a folder be opened and synced.
-pub(super) fn sync_folder(disk: &dyn Disk, folder: &Path) -> anyhow::Result<()> {
+pub(super) fn sync_folder(disk: &dyn Disk, folder: &Path) -> Result<()> {
     if !cfg!(unix) {
         return Ok(());
     }

@@ -10,10 +10,8 @@ use std::{
     path::Path,
 };
 
-use anyhow::Context;
-
 use super::{CHECKPOINTS, CONFIG, LOCK, METRICS, RUN, WEIGHTS, disk::cannot};
-use crate::failure::Failure;
+use crate::error::{Context, Result, RunError};
 
 /// Greatest length of a file that holds settings, facts or hashes; a configuration may hold a scenario of 256 KiB.
 pub(super) const TEXT_MAX: usize = 2 << 20;
@@ -21,8 +19,8 @@ pub(super) const TEXT_MAX: usize = 2 << 20;
 /// Refuses a run folder in which one of our names is a link, a device, a pipe or a socket.
 ///
 /// # Errors
-/// [`Failure::BadData`] with the first such name.
-pub(super) fn check(run: &Path) -> anyhow::Result<()> {
+/// [`RunError::BadData`] with the first such name.
+pub(super) fn check(run: &Path) -> Result<()> {
     for (name, kind) in entries(run)? {
         let own = name.strip_suffix(".tmp").unwrap_or(&name);
         match own {
@@ -43,7 +41,7 @@ pub(super) fn check(run: &Path) -> anyhow::Result<()> {
 }
 
 /// Names and kinds of what is in a folder, links not followed; of a folder that is not there, none.
-fn entries(folder: &Path) -> anyhow::Result<Vec<(String, FileType)>> {
+fn entries(folder: &Path) -> Result<Vec<(String, FileType)>> {
     let entries = match fs::read_dir(folder) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
         entries => entries.with_context(|| cannot("read", folder))?,
@@ -58,15 +56,15 @@ fn entries(folder: &Path) -> anyhow::Result<Vec<(String, FileType)>> {
         .with_context(|| cannot("read", folder))
 }
 
-fn expect_file(path: &Path, kind: FileType) -> anyhow::Result<()> {
+fn expect_file(path: &Path, kind: FileType) -> Result<()> {
     expect(path, kind.is_file(), kind, "a file")
 }
 
-fn expect_folder(path: &Path, kind: FileType) -> anyhow::Result<()> {
+fn expect_folder(path: &Path, kind: FileType) -> Result<()> {
     expect(path, kind.is_dir(), kind, "a folder")
 }
 
-fn expect(path: &Path, holds: bool, kind: FileType, expected: &str) -> anyhow::Result<()> {
+fn expect(path: &Path, holds: bool, kind: FileType, expected: &str) -> Result<()> {
     if holds {
         return Ok(());
     }
@@ -80,5 +78,5 @@ fn expect(path: &Path, holds: bool, kind: FileType, expected: &str) -> anyhow::R
         "{} is {found}, expected {expected}: a run folder holds all that belongs to the run itself",
         path.display()
     );
-    Err(Failure::BadData { message }.into())
+    Err(RunError::BadData { message })
 }

@@ -2,11 +2,15 @@
 
 use std::path::Path;
 
-use mackrl_run::config::{Config, ConfigBuilder, ConfigError, Registry};
 use serde::{Deserialize, Serialize};
 
 use super::{Measurements, RecordedRun};
-use crate::{bounded, failure::Failure, provenance::Provenance};
+use crate::{
+    bounded,
+    config::{Config, ConfigBuilder, ConfigError, registry},
+    error::{Result, RunError},
+    provenance::Provenance,
+};
 
 /// Longest file that is read, in bytes.
 const LENGTH_MAX: usize = 1 << 26;
@@ -18,56 +22,77 @@ const PLAYED: &str = "return_mean";
 const DELEGATION: &str = "mackrl/delegation_rate_ck_enemies_";
 
 /// What a run gave.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct TrainingRun {
-    /// Where it comes from; files of early versions do not say.
-    #[serde(default)]
-    provenance: Option<Provenance>,
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TrainingRun {
+    /// Where it comes from.
+    provenance: Provenance,
     /// The whole configuration, as TOML.
     config: String,
     /// Share of battles won at each test: before training, and after each interval.
-    pub(crate) battle_won: Vec<f64>,
+    pub battle_won: Vec<f64>,
     /// During the first batch, and then during each interval, the share of chosen pairs that delegated, by the number of
     /// enemies they commonly knew; `None` where that did not occur.
-    pub(crate) delegation: Vec<Vec<Option<f64>>>,
+    pub delegation: Vec<Vec<Option<f64>>>,
+}
+
+/// A run as a file holds it; files of early versions do not say where they come from.
+#[derive(Debug, Deserialize)]
+struct Stored {
+    provenance: Option<Provenance>,
+    config: String,
+    battle_won: Vec<f64>,
+    delegation: Vec<Vec<Option<f64>>>,
 }
 
 impl TrainingRun {
+    /// A finished run with this configuration that this program made.
+    #[must_use]
+    pub fn new(config: &Config, battle_won: Vec<f64>, delegation: Vec<Vec<Option<f64>>>) -> Self {
+        Self {
+            provenance: Provenance::of_run(config),
+            config: config.to_toml(),
+            battle_won,
+            delegation,
+        }
+    }
+
     /// Where these runs come from, repetitions of one experiment taken together.
-    pub(crate) fn provenance_of(runs: &[Self]) -> Vec<Provenance> {
+    pub fn provenance_of(runs: &[Self]) -> Vec<Provenance> {
         Provenance::merged(runs.iter().map(Self::provenance))
     }
 
     /// Where it comes from.
-    pub(crate) fn provenance(&self) -> &Provenance {
-        let provenance = self.provenance.as_ref();
-        provenance.expect("a run has a provenance when it was made, and when it was loaded")
+    #[must_use]
+    pub const fn provenance(&self) -> &Provenance {
+        &self.provenance
     }
 
     /// Reads the file at `path`.
     ///
     /// # Errors
     /// If it cannot be read, or holds something else.
-    pub(crate) fn load(path: &Path) -> anyhow::Result<Self> {
+    pub fn load(path: &Path) -> Result<Self> {
         let bytes = bounded::read(path, LENGTH_MAX)?;
-        let bad = |reason: String| Failure::BadData {
+        let bad = |reason: String| RunError::BadData {
             message: format!("{} holds no training run: {reason}", path.display()),
         };
-        let mut run: Self =
+        let stored: Stored =
             serde_json::from_slice(&bytes).map_err(|error| bad(error.to_string()))?;
-        let config = run.config().map_err(|error| bad(error.to_string()))?;
-        (run.provenance).get_or_insert_with(|| Provenance::of_unknown_code(&config));
-        Ok(run)
+        let config = config(&stored.config).map_err(|error| bad(error.to_string()))?;
+        Ok(Self {
+            provenance: (stored.provenance).unwrap_or_else(|| Provenance::of_unknown_code(&config)),
+            config: stored.config,
+            battle_won: stored.battle_won,
+            delegation: stored.delegation,
+        })
     }
 
     /// Everything that determines its result.
     ///
     /// # Errors
     /// If this program does not understand it.
-    pub(crate) fn config(&self) -> Result<Config, ConfigError> {
-        ConfigBuilder::new(&Registry::built_in())
-            .recorded("config", &self.config)?
-            .build()
+    pub fn config(&self) -> Result<Config, ConfigError> {
+        config(&self.config)
     }
 
     /// One of the metrics that are kept, at the environment steps at which tests were due; seconds are not kept.
@@ -93,7 +118,10 @@ impl TrainingRun {
     }
 
     /// Reads what the figures need from the folder of a finished run.
-    pub(crate) fn of_folder(folder: &Path) -> anyhow::Result<Self> {
+    ///
+    /// # Errors
+    /// If the folder or its metrics cannot be read.
+    pub fn of_folder(folder: &Path) -> Result<Self> {
         let run = RecordedRun::open(folder.to_owned())?;
         let won = Measurements::read(&run, WON)?;
         let first_batch = Measurements::read(&run, PLAYED)?.steps.first().copied();
@@ -104,7 +132,7 @@ impl TrainingRun {
             let metric = format!("{DELEGATION}{enemies}");
             let rates = match Measurements::read(&run, &metric) {
                 Ok(rates) => rates,
-                Err(error) if Failure::is_missing_metric(&error) => continue,
+                Err(error) if error.is_missing_metric() => continue,
                 Err(error) => return Err(error),
             };
             for (&step, &rate) in rates.steps.iter().zip(&rates.values) {
@@ -119,24 +147,20 @@ impl TrainingRun {
             }
         }
         Ok(Self {
-            provenance: run.provenance.into_iter().next_back(),
             config: run.config.to_toml(),
+            provenance: run
+                .provenance
+                .into_iter()
+                .next_back()
+                .unwrap_or_else(|| Provenance::of_unknown_code(&run.config)),
             battle_won: won.values,
             delegation,
         })
     }
 }
 
-#[cfg(test)]
-impl TrainingRun {
-    /// A run of the built-in configuration that won so often at its tests.
-    pub(crate) fn of_wins(battle_won: &[f64]) -> Self {
-        let config = Config::default();
-        Self {
-            provenance: Some(Provenance::of_run(&config)),
-            config: config.to_toml(),
-            battle_won: battle_won.to_vec(),
-            delegation: Vec::new(),
-        }
-    }
+fn config(text: &str) -> Result<Config, ConfigError> {
+    ConfigBuilder::new(registry())
+        .recorded("config", text)?
+        .build()
 }

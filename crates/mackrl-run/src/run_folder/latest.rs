@@ -16,17 +16,17 @@ const TAIL: u64 = 64 * 1024;
 
 /// The latest of the numbers that progress is told by.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct LatestRow {
+pub struct LatestRow {
     /// Environment steps played.
-    pub(crate) steps_env: u64,
+    pub steps_env: u64,
     /// Environment steps a second.
-    pub(crate) steps_per_s: Option<f64>,
+    pub steps_per_s: Option<f64>,
     /// Share of battles won in a greedy test, in [0, 1].
-    pub(crate) battle_won_mean: Option<f64>,
+    pub battle_won_mean: Option<f64>,
 }
 
 /// Reads the end of the metrics of the run at `path`; whatever cannot be read is not known.
-pub(crate) fn latest_row(path: &Path) -> LatestRow {
+pub fn latest_row(path: &Path) -> LatestRow {
     let mut latest = LatestRow::default();
     for line in tail(&path.join(METRICS))
         .unwrap_or_default()

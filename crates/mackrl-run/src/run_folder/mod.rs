@@ -29,29 +29,27 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use anyhow::Context;
 use checkpoints::Surroundings;
 use disk::{Disk, RealDisk, cannot, cannot_write};
 use mackrl::nn::InstructionSet;
-use mackrl_run::{
-    config::Config,
-    training::{Checkpoint, assembly::tensors_bytes_max},
-};
 use serde::{Deserialize, Serialize};
 
 use crate::{
     bounded,
-    failure::Failure,
+    config::Config,
+    error::{Context, Result, RunError},
     provenance::{CODE, Provenance},
+    training::{Checkpoint, assembly::tensors_bytes_max},
 };
 use event_file::EventFile;
-pub(crate) use latest::{LatestRow, latest_row};
+pub use latest::{LatestRow, latest_row};
 use manifest::{Fingerprint, Growing};
-pub(crate) use recorded::{Recorded, Row, timeless};
-pub(crate) use run::Run;
+pub use recorded::{Recorded, Row, timeless};
+pub use run::Run;
 
 const CONFIG: &str = "config.toml";
-pub(crate) const METRICS: &str = "metrics.jsonl";
+/// Name of the file of metrics in a run folder.
+pub const METRICS: &str = "metrics.jsonl";
 const RUN: &str = "run.json";
 const WEIGHTS: &str = "weights.safetensors";
 const LOCK: &str = "lock";
@@ -60,7 +58,7 @@ const CHECKPOINTS: &str = "checkpoints";
 /// How far a run has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(crate) enum Status {
+pub enum Status {
     /// Training goes on, or was interrupted without a chance to say so.
     Running,
     /// Training reached its end.
@@ -90,7 +88,7 @@ struct RunRecord {
 
 /// The folder of a run that is being made.
 #[derive(Debug)]
-pub(crate) struct RunFolder {
+pub struct RunFolder {
     path: PathBuf,
     disk: Box<dyn Disk>,
     config: Fingerprint,
@@ -105,23 +103,25 @@ pub(crate) struct RunFolder {
 
 /// A run that goes on.
 #[derive(Debug)]
-pub(crate) struct Resumption {
-    pub(crate) folder: RunFolder,
-    pub(crate) config: Config,
+pub struct Resumption {
+    /// Its folder, at that checkpoint.
+    pub folder: RunFolder,
+    /// Everything that determines its result.
+    pub config: Config,
     /// Where it goes on; a run that was interrupted before its first checkpoint begins again.
-    pub(crate) checkpoint: Option<Checkpoint>,
+    pub checkpoint: Option<Checkpoint>,
     /// Later checkpoints that could not be used, and why.
-    pub(crate) damaged: Vec<String>,
+    pub damaged: Vec<String>,
     /// The code that made the run so far, if it is not that of this program.
-    pub(crate) earlier_code: Option<String>,
+    pub earlier_code: Option<String>,
 }
 
 impl RunFolder {
     /// Refuses a path that cannot become a run folder, without touching anything.
     ///
     /// # Errors
-    /// [`Failure::FolderInUse`] if something lies there already.
-    pub(crate) fn check_free(path: &Path) -> anyhow::Result<()> {
+    /// [`RunError::FolderInUse`] if something lies there already.
+    pub fn check_free(path: &Path) -> Result<()> {
         let entries = match fs::read_dir(path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
             entries => entries.with_context(|| cannot("use", path))?,
@@ -140,25 +140,24 @@ impl RunFolder {
         }
         let folder = path.to_owned();
         Err(match recorded_status(path) {
-            Some(Status::Finished) => Failure::FolderInUse {
+            Some(Status::Finished) => RunError::FolderInUse {
                 folder,
-                holds: "a finished run".to_owned(),
+                holds: "a finished run",
             },
-            _ if path.join(CONFIG).exists() => Failure::UnfinishedRun { folder },
-            _ => Failure::FolderInUse {
+            _ if path.join(CONFIG).exists() => RunError::UnfinishedRun { folder },
+            _ => RunError::FolderInUse {
                 folder,
-                holds: "other files".to_owned(),
+                holds: "other files",
             },
-        }
-        .into())
+        })
     }
 
     /// Creates the folder of a new run, with its configuration and an empty list of metrics.
     ///
     /// # Errors
-    /// [`Failure::FolderInUse`] or [`Failure::UnfinishedRun`] if something lies there already, [`Failure::FolderLocked`] if
+    /// [`RunError::FolderInUse`] or [`RunError::UnfinishedRun`] if something lies there already, [`RunError::FolderLocked`] if
     /// another process writes there; otherwise the path that could not be written.
-    pub(crate) fn create(path: &Path, config: &Config, threads: usize) -> anyhow::Result<Self> {
+    pub fn create(path: &Path, config: &Config, threads: usize) -> Result<Self> {
         Self::check_free(path)?;
         fs::create_dir_all(path).with_context(|| cannot("create", path))?;
         let lock = lock(path)?;
@@ -172,18 +171,18 @@ impl RunFolder {
     ///
     /// # Errors
     /// As [`RunFolder::create`].
-    pub(crate) fn prepare(path: &Path, config: &Config, threads: usize) -> anyhow::Result<()> {
+    pub fn prepare(path: &Path, config: &Config, threads: usize) -> Result<()> {
         Self::create(path, config, threads)?.set_status(Status::Interrupted)
     }
 
     /// Whether a process writes there now.
-    pub(crate) fn is_in_use(path: &Path) -> bool {
+    pub fn is_in_use(path: &Path) -> bool {
         let lock = File::open(path.join(LOCK));
         lock.is_ok_and(|lock| matches!(lock.try_lock(), Err(TryLockError::WouldBlock)))
     }
 
     /// Whether the run there has reached its end.
-    pub(crate) fn is_finished(path: &Path) -> bool {
+    pub fn is_finished(path: &Path) -> bool {
         recorded_status(path) == Some(Status::Finished)
     }
 
@@ -191,8 +190,8 @@ impl RunFolder {
     /// again.
     ///
     /// # Errors
-    /// [`Failure::NotARun`], [`Failure::FolderLocked`] if another process writes there, [`Failure::BadData`] if no checkpoint can be used; otherwise the path that could not be read or written.
-    pub(crate) fn resume(path: &Path, threads: usize) -> anyhow::Result<Resumption> {
+    /// [`RunError::NotARun`], [`RunError::FolderLocked`] if another process writes there, [`RunError::BadData`] if no checkpoint can be used; otherwise the path that could not be read or written.
+    pub fn resume(path: &Path, threads: usize) -> Result<Resumption> {
         untrusted::check(path)?;
         let config = run::read_config(path)?;
         let lock = lock(path)?;
@@ -225,7 +224,7 @@ impl RunFolder {
         threads: usize,
         lock: File,
         metrics_so_far: Growing,
-    ) -> anyhow::Result<Self> {
+    ) -> Result<Self> {
         let config_path = path.join(CONFIG);
         let config_text = bounded::read(&config_path, untrusted::TEXT_MAX)?;
         let metrics = open_metrics(&path.join(METRICS), metrics_so_far.bytes())?;
@@ -237,7 +236,9 @@ impl RunFolder {
             status: Status::Running,
         });
         record.threads = threads;
-        record.simd = Some(InstructionSet::chosen()?.name().to_owned());
+        record.simd = InstructionSet::chosen()
+            .ok()
+            .map(|set| set.name().to_owned());
         let provenance = Provenance::of_run(config);
         if !record.provenance.contains(&provenance) {
             record.provenance.push(provenance);
@@ -258,21 +259,27 @@ impl RunFolder {
     }
 
     /// Where it lies.
-    pub(crate) fn path(&self) -> &Path {
+    pub fn path(&self) -> &Path {
         &self.path
     }
 
     /// Begins an event file for TensorBoard, in which rows of metrics stand from now on; the run has played `steps_env`
     /// environment steps, of which it has told already.
-    pub(crate) fn write_events(&mut self, steps_env: u64) -> anyhow::Result<()> {
+    ///
+    /// # Errors
+    /// Path, bytes and what the operating system says.
+    pub fn write_events(&mut self, steps_env: u64) -> Result<()> {
         let forgotten_from = if steps_env == 0 { 0 } else { steps_env + 1 };
         let events = EventFile::create(&*self.disk, &self.path, forgotten_from)?;
         self.events = Some(events);
         Ok(())
     }
 
-    /// Adds one line to the metrics.
-    pub(crate) fn append_metrics(&mut self, object: &str) -> anyhow::Result<()> {
+    /// Adds one line to the metrics: a JSON object.
+    ///
+    /// # Errors
+    /// Path, bytes and what the operating system says.
+    pub fn append_metrics(&mut self, object: &str) -> Result<()> {
         debug_assert!(!object.contains('\n'), "a row of metrics is one line");
         let line = format!("{object}\n");
         self.disk
@@ -289,11 +296,7 @@ impl RunFolder {
     ///
     /// # Errors
     /// Path, bytes and what the operating system says; earlier checkpoints are intact then.
-    pub(crate) fn write_checkpoint(
-        &mut self,
-        number: u64,
-        checkpoint: &Checkpoint,
-    ) -> anyhow::Result<()> {
+    pub fn write_checkpoint(&mut self, number: u64, checkpoint: &Checkpoint) -> Result<()> {
         self.disk
             .sync(&self.metrics)
             .with_context(|| cannot("sync", &self.path.join(METRICS)))?;
@@ -315,41 +318,49 @@ impl RunFolder {
     }
 
     /// Puts the weights in place of earlier ones.
-    pub(crate) fn write_weights(&self, weights: &[u8]) -> anyhow::Result<()> {
+    ///
+    /// # Errors
+    /// Path, bytes and what the operating system says.
+    pub fn write_weights(&self, weights: &[u8]) -> Result<()> {
         self.replace(WEIGHTS, weights)
     }
 
     /// Records how far the run has come.
-    pub(crate) fn set_status(&mut self, status: Status) -> anyhow::Result<()> {
+    ///
+    /// # Errors
+    /// Path, bytes and what the operating system says.
+    pub fn set_status(&mut self, status: Status) -> Result<()> {
         self.record.status = status;
-        let json = serde_json::to_string_pretty(&self.record)?;
+        let json = serde_json::to_string_pretty(&self.record)
+            .map_err(io::Error::from)
+            .with_context(|| cannot("write", &self.path.join(RUN)))?;
         self.replace(RUN, (json + "\n").as_bytes())
     }
 
-    fn replace(&self, name: &str, content: &[u8]) -> anyhow::Result<()> {
+    fn replace(&self, name: &str, content: &[u8]) -> Result<()> {
         disk::replace(&*self.disk, &self.path.join(name), content)
     }
 }
 
 /// What can be said of a run without its weights.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Description {
+pub struct Description {
     /// How far it has come.
-    pub(crate) status: Status,
+    pub status: Status,
     /// Where its results come from: one entry for each version of the program that went on with it.
-    pub(crate) provenance: Vec<Provenance>,
+    pub provenance: Vec<Provenance>,
 }
 
 /// Whether a run lies in this folder.
-pub(crate) fn is_run(path: &Path) -> bool {
+pub fn is_run(path: &Path) -> bool {
     path.join(CONFIG).is_file()
 }
 
 /// Reads the configuration of the run at `path`, and what can be said of it.
 ///
 /// # Errors
-/// [`Failure::NotARun`] if there is no configuration; otherwise what is wrong with it.
-pub(crate) fn read_description(path: &Path) -> anyhow::Result<(Config, Description)> {
+/// [`RunError::NotARun`] if there is no configuration; otherwise what is wrong with it.
+pub fn read_description(path: &Path) -> Result<(Config, Description)> {
     let config = run::read_config(path)?;
     let (status, mut provenance) = read_record(path)
         .map_or((Status::Running, Vec::new()), |record| {
@@ -366,12 +377,12 @@ pub(crate) fn read_description(path: &Path) -> anyhow::Result<(Config, Descripti
 ///
 /// # Errors
 /// Path, bytes and what the operating system says; the file that was there is intact then.
-pub(crate) fn replace(path: &Path, content: &[u8]) -> anyhow::Result<()> {
+pub fn replace(path: &Path, content: &[u8]) -> Result<()> {
     disk::replace(&RealDisk, path, content)
 }
 
 /// Takes the folder for this process until the file is closed; the operating system closes it, however the process ends.
-fn lock(path: &Path) -> anyhow::Result<File> {
+fn lock(path: &Path) -> Result<File> {
     let lock_path = path.join(LOCK);
     let lock = OpenOptions::new()
         .create(true)
@@ -383,14 +394,14 @@ fn lock(path: &Path) -> anyhow::Result<File> {
         Ok(()) => Ok(lock),
         Err(TryLockError::WouldBlock) => {
             let folder = path.to_owned();
-            Err(Failure::FolderLocked { folder }.into())
+            Err(RunError::FolderLocked { folder })
         }
         Err(TryLockError::Error(error)) => Err(error).with_context(|| cannot("lock", &lock_path)),
     }
 }
 
 /// Opens the metrics for appending, and cuts off everything after the first `bytes` bytes.
-fn open_metrics(path: &Path, bytes: u64) -> anyhow::Result<File> {
+fn open_metrics(path: &Path, bytes: u64) -> Result<File> {
     let file = OpenOptions::new()
         .create(true)
         .append(true)

@@ -1,6 +1,7 @@
 //! Making runs side by side, each in a process of its own.
 //!
-//! A run's process is `mackrl resume` on its folder, which is made with its configuration first. The process holds the read end of
+//! A run's process is started on its folder, which is made with its configuration first; for the program that is `mackrl resume`, for
+//! an own one whatever calls [`resume`](crate::training_loop::resume). The process holds, as its stdin, the read end of
 //! a pipe whose write end this one holds and never uses: when this process ends, however that comes, the pipe breaks, and every
 //! run writes a checkpoint and stops. So a sweep that is killed leaves no processes behind, without signals having to be
 //! passed on.
@@ -9,15 +10,17 @@ use std::{
     collections::VecDeque,
     io::Read,
     num::NonZeroUsize,
+    path::Path,
     process::{Child, ChildStderr, Command, Stdio},
     thread::{self, JoinHandle},
     time::Duration,
 };
 
-use anyhow::Context;
-
-use super::{Entry, State, display::Display};
-use crate::{failure::Failure, signals::StopRequest};
+use super::{Entry, State};
+use crate::{
+    error::{Context, Result, RunError},
+    stop_request::StopRequest,
+};
 
 /// Between two looks at the processes.
 const PAUSE: Duration = Duration::from_millis(50);
@@ -28,11 +31,11 @@ const INTERRUPTED: i32 = 75;
 
 /// How a sweep ended.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(crate) struct Outcome {
+pub struct Outcome {
     /// Runs that reached their end, now or earlier.
-    pub(crate) finished: usize,
+    pub finished: usize,
     /// Runs that failed: their names, and what they said.
-    pub(crate) failed: Vec<(String, String)>,
+    pub failed: Vec<(String, String)>,
 }
 
 /// A process that makes a run.
@@ -42,18 +45,39 @@ struct Worker {
     words: JoinHandle<String>,
 }
 
-/// Makes all runs that are not finished, `jobs` at a time, and shows how they stand on stderr.
+/// What is told while a sweep goes on. The unit type listens to nothing.
+pub trait Observer {
+    /// These runs are to be made.
+    fn begin(&mut self, _entries: &[Entry]) {}
+
+    /// The runs with the numbers `running` are being made, and so many have failed; told some twenty times a second.
+    fn progress(&mut self, _entries: &[Entry], _running: &[usize], _failed: usize) {}
+
+    /// The run with this number has reached its end.
+    fn note_finished(&mut self, _entries: &[Entry], _run: usize) {}
+
+    /// No run is being made any more.
+    fn end(&mut self, _entries: &[Entry]) {}
+}
+
+impl Observer for () {}
+
+/// Makes all runs that are not finished, `jobs` at a time.
 ///
-/// A run that fails does not stop the others.
+/// `process` gives the command that goes on with the run in a folder: it has to stop, after a checkpoint and with exit code 75, when its
+/// stdin ends, to end with exit code 0 when the run is finished, and to say in a last line of stderr that begins with `error: `
+/// why it is not. A run that fails does not stop the others.
 ///
 /// # Errors
-/// [`Failure::SweepInterrupted`] when asked to stop; [`Failure::OtherConfiguration`] if a folder holds another run, before any is
+/// [`RunError::SweepInterrupted`] when asked to stop; [`RunError::OtherConfiguration`] if a folder holds another run, before any is
 /// made; otherwise what kept processes from being started.
-pub(crate) fn make_all(
+pub fn make_all(
     entries: &[Entry],
     jobs: NonZeroUsize,
+    process: &dyn Fn(&Path) -> Command,
     stop: &StopRequest,
-) -> anyhow::Result<Outcome> {
+    observer: &mut dyn Observer,
+) -> Result<Outcome> {
     let mut queue = VecDeque::new();
     let mut outcome = Outcome::default();
     for (index, entry) in entries.iter().enumerate() {
@@ -62,16 +86,17 @@ pub(crate) fn make_all(
             _ => queue.push_back(index),
         }
     }
-    let mut display = Display::new(entries);
+    observer.begin(entries);
     let mut workers: Vec<Worker> = Vec::new();
     while !queue.is_empty() || !workers.is_empty() {
         if stop.is_made() {
-            return interrupt(entries, workers, display);
+            observer.end(entries);
+            return interrupt(entries, workers);
         }
         while workers.len() < jobs.get()
             && let Some(index) = queue.pop_front()
         {
-            workers.push(Worker::start(entries, index)?);
+            workers.push(Worker::start(entries, index, process)?);
         }
         let (ended, going) = workers.into_iter().partition(Worker::has_ended);
         workers = going;
@@ -80,50 +105,42 @@ pub(crate) fn make_all(
             match worker.end()? {
                 Ok(()) => {
                     outcome.finished += 1;
-                    display.note_finished(index);
+                    observer.note_finished(entries, index);
                 }
                 Err(words) => outcome.failed.push((entries[index].name.clone(), words)),
             }
         }
         let running: Vec<usize> = workers.iter().map(|worker| worker.index).collect();
-        display.show(&running, outcome.failed.len());
+        observer.progress(entries, &running, outcome.failed.len());
         if !workers.is_empty() {
             thread::sleep(PAUSE);
         }
     }
-    display.finish();
+    observer.end(entries);
     Ok(outcome)
 }
 
 /// Lets every process write its checkpoint, and tells how far the sweep has come.
-fn interrupt(
-    entries: &[Entry],
-    workers: Vec<Worker>,
-    display: Display<'_>,
-) -> anyhow::Result<Outcome> {
-    display.finish();
+fn interrupt(entries: &[Entry], workers: Vec<Worker>) -> Result<Outcome> {
     let ends: Vec<_> = workers.into_iter().map(Worker::let_go).collect();
     for mut end in ends {
-        end.wait().context("cannot wait for a run to stop")?;
+        end.wait()
+            .with_context(|| "cannot wait for a run to stop")?;
     }
     let states = entries.iter().map(Entry::state);
-    let states = states.collect::<anyhow::Result<Vec<_>>>()?;
+    let states = states.collect::<Result<Vec<_>>>()?;
     let finished = states.iter().filter(|state| **state == State::Finished);
-    Err(Failure::SweepInterrupted {
+    Err(RunError::SweepInterrupted {
         finished: finished.count(),
         runs: entries.len(),
-    }
-    .into())
+    })
 }
 
 impl Worker {
-    fn start(entries: &[Entry], index: usize) -> anyhow::Result<Self> {
+    fn start(entries: &[Entry], index: usize, process: &dyn Fn(&Path) -> Command) -> Result<Self> {
         let entry = &entries[index];
         entry.prepare()?;
-        let program = std::env::current_exe().context("cannot find this program's file")?;
-        let mut child = Command::new(program)
-            .args(["resume", "--threads", "1", "--leashed"])
-            .arg(&entry.folder)
+        let mut child = process(&entry.folder)
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
@@ -143,8 +160,8 @@ impl Worker {
     }
 
     /// How the process ended: well, or with these words.
-    fn end(mut self) -> anyhow::Result<Result<(), String>> {
-        let status = self.child.wait().context("cannot wait for a run")?;
+    fn end(mut self) -> Result<Result<(), String>> {
+        let status = self.child.wait().with_context(|| "cannot wait for a run")?;
         if status.success() {
             return Ok(Ok(()));
         }

@@ -2,10 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use mackrl_run::config::{Origin, Registry};
-
 use super::{RecordedRun, setting};
-use crate::{failure::Failure, provenance::Provenance, run_folder::Status};
+use crate::{
+    config::{Origin, registry},
+    error::{Result, RunError},
+    provenance::Provenance,
+    run_folder::Status,
+};
 
 /// Settings in which runs may differ and still be compared.
 const FREE: [&str; 6] = [
@@ -21,46 +24,46 @@ const FREE: [&str; 6] = [
 
 /// Which runs are used, and how strictly.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Selection {
+pub struct Selection {
     /// Runs on this map only.
-    pub(crate) map: Option<String>,
+    pub map: Option<String>,
     /// Settings that make different series, besides the algorithm.
-    pub(crate) by: Vec<String>,
+    pub by: Vec<String>,
     /// Whether unlike runs may be compared.
-    pub(crate) mix: bool,
+    pub mix: bool,
     /// Whether runs that are not finished count.
-    pub(crate) unfinished: bool,
+    pub unfinished: bool,
 }
 
 /// Repetitions of one experiment.
 #[derive(Debug, Clone)]
-pub(crate) struct Series {
+pub struct Series {
     /// The map's name.
-    pub(crate) map: String,
+    pub map: String,
     /// What learns, and the settings that were asked to be told apart.
-    pub(crate) name: String,
+    pub name: String,
     /// The repetitions.
-    pub(crate) runs: Vec<RecordedRun>,
+    pub runs: Vec<RecordedRun>,
 }
 
 /// Runs by experiment.
 #[derive(Debug, Clone)]
-pub(crate) struct Grouping {
+pub struct Grouping {
     /// In the order of maps, then of names, MACKRL first.
-    pub(crate) series: Vec<Series>,
+    pub series: Vec<Series>,
     /// Runs that were left out because they are not finished.
-    pub(crate) left_out: usize,
+    pub left_out: usize,
 }
 
 impl Grouping {
     /// The maps, in order, each once.
-    pub(crate) fn maps(&self) -> Vec<&str> {
+    pub fn maps(&self) -> Vec<&str> {
         let maps: BTreeSet<&str> = self.series.iter().map(|series| &*series.map).collect();
         maps.into_iter().collect()
     }
 
     /// The names of series, in order, each once.
-    pub(crate) fn names(&self) -> Vec<&str> {
+    pub fn names(&self) -> Vec<&str> {
         let mut names: Vec<&str> = Vec::new();
         for series in &self.series {
             if !names.contains(&&*series.name) {
@@ -71,7 +74,7 @@ impl Grouping {
     }
 
     /// Where the runs come from: one entry for each experiment.
-    pub(crate) fn provenance(&self) -> Vec<Provenance> {
+    pub fn provenance(&self) -> Vec<Provenance> {
         let runs = self.series.iter().flat_map(|series| &series.runs);
         Provenance::merged(runs.flat_map(|run| &run.provenance))
     }
@@ -80,8 +83,8 @@ impl Grouping {
 /// Groups runs by map, algorithm and what `selection` tells apart.
 ///
 /// # Errors
-/// [`Failure::Usage`] if nothing is left, or a setting is unknown; [`Failure::UnlikeRuns`] if runs differ in anything else.
-pub(crate) fn group(runs: Vec<RecordedRun>, selection: &Selection) -> anyhow::Result<Grouping> {
+/// [`RunError::Selection`] if nothing is left, or a setting is unknown; [`RunError::UnlikeRuns`] if runs differ in anything else.
+pub fn group(runs: Vec<RecordedRun>, selection: &Selection) -> Result<Grouping> {
     for key in &selection.by {
         check_key(key)?;
     }
@@ -103,16 +106,14 @@ pub(crate) fn group(runs: Vec<RecordedRun>, selection: &Selection) -> anyhow::Re
             "none of the {found} runs is on the map `{map}`, expected {}",
             maps.join(" or ")
         );
-        return Err(Failure::Usage { message }.into());
+        return Err(RunError::Selection { message });
     }
     let all = runs.len();
     let counts = |run: &RecordedRun| selection.unfinished || run.status == Status::Finished;
     let runs: Vec<RecordedRun> = runs.into_iter().filter(counts).collect();
     let left_out = all - runs.len();
     if runs.is_empty() {
-        let message =
-            format!("none of the {all} runs is finished; --unfinished uses them as they are");
-        return Err(Failure::Usage { message }.into());
+        return Err(RunError::NoneFinished { runs: all });
     }
     if !selection.mix {
         check_alike(&runs, selection)?;
@@ -159,17 +160,17 @@ fn display_name(algorithm: &str) -> String {
 }
 
 /// Refuses a key that no setting has.
-fn check_key(key: &str) -> anyhow::Result<()> {
+fn check_key(key: &str) -> Result<()> {
     let text = format!("--by {key}");
-    let found = Registry::built_in().settings_called(key, Origin::CommandLine { text })?;
+    let found = registry().settings_called(key, Origin::CommandLine { text })?;
     if found.iter().any(|setting| setting.key == key) {
         return Ok(());
     }
     let message = format!("--by {key}: expected one setting, such as algorithm.delegation");
-    Err(Failure::Usage { message }.into())
+    Err(RunError::Selection { message })
 }
 
-fn check_alike(runs: &[RecordedRun], selection: &Selection) -> anyhow::Result<()> {
+fn check_alike(runs: &[RecordedRun], selection: &Selection) -> Result<()> {
     let mut references: BTreeMap<&str, &RecordedRun> = BTreeMap::new();
     let mut seeds: BTreeMap<(&str, String, u64), &RecordedRun> = BTreeMap::new();
     for run in runs {
@@ -193,15 +194,14 @@ fn check_alike(runs: &[RecordedRun], selection: &Selection) -> anyhow::Result<()
             run.config.run.seed,
         );
         if let Some(twin) = seeds.insert(identity, run) {
-            return Err(Failure::UnlikeRuns {
+            return Err(RunError::UnlikeRuns {
                 message: format!(
                     "{} and {} are the same experiment with the same seed, which would be counted twice",
                     twin.path.display(),
                     run.path.display()
                 ),
-                remedy: "name one of them only, or use both all the same with --mix".to_owned(),
-            }
-            .into());
+                key: None,
+            });
         }
     }
     Ok(())
@@ -236,18 +236,8 @@ fn difference(
     .find(|(_, values)| values[0] != values[1])
 }
 
-fn unlike(
-    one: &RecordedRun,
-    other: &RecordedRun,
-    what: &str,
-    values: &[String; 2],
-) -> anyhow::Error {
-    let by = if what.contains('.') {
-        format!("tell them apart with --by {what}, or ")
-    } else {
-        String::new()
-    };
-    Failure::UnlikeRuns {
+fn unlike(one: &RecordedRun, other: &RecordedRun, what: &str, values: &[String; 2]) -> RunError {
+    RunError::UnlikeRuns {
         message: format!(
             "{} and {} differ in {what}: {} and {}",
             one.path.display(),
@@ -255,9 +245,8 @@ fn unlike(
             values[0],
             values[1]
         ),
-        remedy: format!("{by}use them together all the same with --mix"),
+        key: what.contains('.').then(|| what.to_owned()),
     }
-    .into()
 }
 
 #[cfg(test)]

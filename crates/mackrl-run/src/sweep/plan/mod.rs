@@ -9,12 +9,17 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use mackrl_run::config::{
-    Config, ConfigBuilder, ConfigError, Leaf, Origin, Registry, line_and_column, parse_document,
-};
 use serde::{Deserialize, de::IgnoredAny};
 
-use crate::{args::with_scenario, bounded, sweep::Entry};
+use crate::{
+    bounded,
+    config::{
+        Config, ConfigBuilder, ConfigError, Leaf, Origin, line_and_column, parse_document, registry,
+    },
+    error::{Result, RunError},
+    scenario_file::with_scenario,
+    sweep::Entry,
+};
 
 /// Longest plan that is read, in bytes.
 const LENGTH_MAX: usize = 1 << 20;
@@ -58,11 +63,11 @@ enum Seeds {
 
 /// What a sweep does.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Plan {
+pub struct Plan {
     /// Folder of the run folders.
-    pub(crate) out: PathBuf,
+    pub out: PathBuf,
     /// All runs: maps, then algorithms, then variants and varied settings, then seeds, the last innermost.
-    pub(crate) entries: Vec<Entry>,
+    pub entries: Vec<Entry>,
 }
 
 /// A kind of run: what is laid over the settings that all have, and how that is called.
@@ -101,27 +106,22 @@ impl Plan {
     ///
     /// # Errors
     /// What cannot be read or understood, with line and column.
-    pub(crate) fn read(path: &Path, out: Option<&Path>) -> anyhow::Result<Self> {
+    pub fn read(path: &Path, out: Option<&Path>) -> Result<Self> {
         let bytes = bounded::read(path, LENGTH_MAX)?;
         let name = path.display().to_string();
-        let text = String::from_utf8(bytes).map_err(|error| {
-            let at = error.utf8_error().valid_up_to();
-            ConfigError::Syntax {
-                origin: Origin::Unknown,
-                message: format!("{name}: not UTF-8 text at byte {at}"),
-            }
+        let text = bounded::text(&name, bytes).map_err(|message| ConfigError::Syntax {
+            origin: Origin::Unknown,
+            message,
         })?;
         let stem = path.file_stem().unwrap_or_default();
         Self::parse(&name, &text, out, &Path::new("runs").join(stem))
     }
 
-    /// Reads the plan `text` of the file called `name`; `otherwise` is the folder if nobody names one.
-    pub(crate) fn parse(
-        name: &str,
-        text: &str,
-        out: Option<&Path>,
-        otherwise: &Path,
-    ) -> anyhow::Result<Self> {
+    /// Reads the plan `text` of the file called `name`; `otherwise` is the folder if none is named.
+    ///
+    /// # Errors
+    /// What cannot be understood, with line and column.
+    pub fn parse(name: &str, text: &str, out: Option<&Path>, otherwise: &Path) -> Result<Self> {
         let syntax_error = |at, message: String| ConfigError::Syntax {
             origin: origin(name, text, at),
             message,
@@ -147,7 +147,7 @@ impl Plan {
 }
 
 impl Reading<'_> {
-    fn entries(&self, out: &Path) -> anyhow::Result<Vec<Entry>> {
+    fn entries(&self, out: &Path) -> Result<Vec<Entry>> {
         let Document {
             maps, algorithms, ..
         } = &self.document;
@@ -189,7 +189,7 @@ impl Reading<'_> {
         kind: &Kind,
         seeds: &[u64],
         out: &Path,
-    ) -> anyhow::Result<Vec<Entry>> {
+    ) -> Result<Vec<Entry>> {
         let builder = lay(builder, &kind.settings)?;
         refuse(&builder, &LISTED[2..])?;
         let builder = with_scenario(builder)?;
@@ -210,8 +210,8 @@ impl Reading<'_> {
     }
 
     /// What all runs have in common.
-    fn base(&self) -> anyhow::Result<ConfigBuilder> {
-        let builder = ConfigBuilder::new(&Registry::built_in())
+    fn base(&self) -> Result<ConfigBuilder> {
+        let builder = ConfigBuilder::new(registry())
             .preset(&self.document.preset)
             .map_err(|error| self.error("preset", error.to_string()))?;
         let builder = lay(builder, &self.settings_in(&["settings"]))?;
@@ -219,7 +219,7 @@ impl Reading<'_> {
         Ok(builder)
     }
 
-    fn seeds(&self) -> anyhow::Result<Vec<u64>> {
+    fn seeds(&self) -> Result<Vec<u64>> {
         match self.document.seeds.clone() {
             Seeds::Count(count) if (1..=RUNS_MAX as u64).contains(&count) => {
                 Ok((1..=count).collect())
@@ -234,7 +234,7 @@ impl Reading<'_> {
     }
 
     /// Every variant with every combination of varied settings.
-    fn kinds(&self) -> anyhow::Result<Vec<Kind>> {
+    fn kinds(&self) -> Result<Vec<Kind>> {
         let mut kinds = Vec::new();
         for name in self.document.variants.keys() {
             if *name != plain(name) || name.is_empty() {
@@ -276,7 +276,7 @@ impl Reading<'_> {
         list: &str,
         key: &str,
         value: &str,
-    ) -> anyhow::Result<ConfigBuilder> {
+    ) -> Result<ConfigBuilder> {
         let quoted = toml::Value::String(value.to_owned());
         Ok(builder.assign(self.origin_of(list), &format!("{key}={quoted}"))?)
     }
@@ -288,7 +288,7 @@ impl Reading<'_> {
         origin(self.name, self.text, leaf.map_or(0, |leaf| leaf.value_at))
     }
 
-    fn error(&self, key: &str, message: String) -> anyhow::Error {
+    fn error(&self, key: &str, message: String) -> RunError {
         let origin = self.origin_of(key);
         ConfigError::Syntax { origin, message }.into()
     }
@@ -303,7 +303,7 @@ fn origin(name: &str, text: &str, at: usize) -> Origin {
     }
 }
 
-fn lay(builder: ConfigBuilder, settings: &[Setting]) -> anyhow::Result<ConfigBuilder> {
+fn lay(builder: ConfigBuilder, settings: &[Setting]) -> Result<ConfigBuilder> {
     settings.iter().try_fold(builder, |builder, setting| {
         let assignment = format!("{}={}", setting.key, setting.value);
         Ok(builder.assign(setting.origin.clone(), &assignment)?)
@@ -311,7 +311,7 @@ fn lay(builder: ConfigBuilder, settings: &[Setting]) -> anyhow::Result<ConfigBui
 }
 
 /// Refuses settings that lists of their own would replace.
-fn refuse(builder: &ConfigBuilder, listed: &[(&str, &str)]) -> anyhow::Result<()> {
+fn refuse(builder: &ConfigBuilder, listed: &[(&str, &str)]) -> Result<()> {
     for (key, list) in listed {
         if let Some(origin @ Origin::File { .. }) = builder.written(key) {
             let origin = origin.clone();
@@ -323,7 +323,7 @@ fn refuse(builder: &ConfigBuilder, listed: &[(&str, &str)]) -> anyhow::Result<()
 }
 
 /// Every kind with every value of a list.
-fn multiplied(kinds: &[Kind], varied: &Setting) -> anyhow::Result<Vec<Kind>> {
+fn multiplied(kinds: &[Kind], varied: &Setting) -> Result<Vec<Kind>> {
     let Setting { key, value, origin } = varied;
     let error = |message: String| ConfigError::Syntax {
         origin: origin.clone(),

@@ -2,31 +2,31 @@
 
 use std::path::{Path, PathBuf};
 
-use mackrl_run::{
-    config::{Config, ConfigBuilder, Registry},
+use super::{CONFIG, WEIGHTS, checkpoints, untrusted};
+use crate::{
+    bounded,
+    config::{Config, ConfigBuilder, registry},
+    error::{Result, RunError},
     training::assembly::tensors_bytes_max,
 };
 
-use super::{CONFIG, WEIGHTS, checkpoints, untrusted};
-use crate::{bounded, failure::Failure};
-
 /// A run that was made earlier.
 #[derive(Debug)]
-pub(crate) struct Run {
+pub struct Run {
     /// Its configuration.
-    pub(crate) config: Config,
+    pub config: Config,
     /// Its weights as safetensors.
-    pub(crate) weights: Vec<u8>,
+    pub weights: Vec<u8>,
     /// Where the weights lie.
-    pub(crate) weights_path: PathBuf,
+    pub weights_path: PathBuf,
 }
 
 impl Run {
     /// Reads configuration and weights: those at the end of the run, or those of its latest checkpoint.
     ///
     /// # Errors
-    /// [`Failure::NotARun`] if there is no configuration; otherwise what is wrong with which file.
-    pub(crate) fn open(path: &Path) -> anyhow::Result<Self> {
+    /// [`RunError::NotARun`] if there is no configuration; otherwise what is wrong with which file.
+    pub fn open(path: &Path) -> Result<Self> {
         untrusted::check(path)?;
         let config = read_config(path)?;
         let weights_path = path.join(WEIGHTS);
@@ -34,7 +34,7 @@ impl Run {
             return Self::with_weights(config, weights_path);
         }
         let (latest, _) = checkpoints::latest(path, tensors_bytes_max(&config)?)?;
-        let stored = latest.ok_or_else(|| Failure::BadData {
+        let stored = latest.ok_or_else(|| RunError::BadData {
             message: format!(
                 "{} has no {WEIGHTS} and no checkpoint: the run has only begun",
                 path.display()
@@ -51,12 +51,12 @@ impl Run {
     ///
     /// # Errors
     /// As [`Run::open`].
-    pub(crate) fn open_with_weights(path: &Path, weights: &Path) -> anyhow::Result<Self> {
+    pub fn open_with_weights(path: &Path, weights: &Path) -> Result<Self> {
         untrusted::check(path)?;
         Self::with_weights(read_config(path)?, weights.to_owned())
     }
 
-    fn with_weights(config: Config, weights_path: PathBuf) -> anyhow::Result<Self> {
+    fn with_weights(config: Config, weights_path: PathBuf) -> Result<Self> {
         let weights = bounded::read(&weights_path, tensors_bytes_max(&config)?)?;
         Ok(Self {
             config,
@@ -67,14 +67,14 @@ impl Run {
 }
 
 /// The configuration of the run at `path`.
-pub(super) fn read_config(path: &Path) -> anyhow::Result<Config> {
+pub(super) fn read_config(path: &Path) -> Result<Config> {
     let config_path = path.join(CONFIG);
     if !config_path.exists() {
         let folder = path.to_owned();
-        return Err(Failure::NotARun { folder }.into());
+        return Err(RunError::NotARun { folder });
     }
     let text = bounded::read_text(&config_path, untrusted::TEXT_MAX)?;
-    let config = ConfigBuilder::new(&Registry::built_in())
+    let config = ConfigBuilder::new(registry())
         .recorded(&config_path.display().to_string(), &text)?
         .build()?;
     Ok(config)

@@ -1,0 +1,421 @@
+//! The loop around a trainer: metrics, checkpoints, progress, and an orderly stop.
+//!
+//! [`train`] makes a run in a folder of its own, [`resume`] goes on with one. Worlds may be any; nothing is printed: what a person
+//! may want to see while waiting goes to an [`Observer`].
+
+use std::{
+    path::{Path, PathBuf},
+    time::Instant,
+};
+
+use serde::Serialize;
+
+use crate::{
+    config::Config,
+    error::{Result, RunError},
+    provenance::{CODE, Provenance},
+    run_folder::{Resumption, RunFolder, Status},
+    stop_request::StopRequest,
+    training::{Checkpoint, MetricRow, Trainer, assembly::World},
+};
+
+/// How a run stands.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Standing {
+    /// Environment steps played.
+    pub steps_env: u64,
+    /// Environment steps to play, > 0.
+    pub steps_env_total: u64,
+    /// Share of battles won in the latest greedy test, in [0, 1], if there was one.
+    pub battle_won_mean: Option<f64>,
+    /// Share of the chosen pairs that delegated, in [0, 1], if there are pairs.
+    pub delegation_rate: Option<f64>,
+}
+
+/// What is told while a run goes on. The unit type listens to nothing.
+pub trait Observer {
+    /// The run begins, or goes on, here.
+    fn begin(&mut self, _standing: &Standing) {}
+
+    /// The run has come so far; told after every update and every test.
+    fn progress(&mut self, _standing: &Standing) {}
+
+    /// Something is not as expected, and the run goes on all the same.
+    fn warn(&mut self, _message: &str) {}
+
+    /// The run has ended, well or not.
+    fn end(&mut self) {}
+}
+
+impl Observer for () {}
+
+/// What a finished run says of itself.
+#[derive(Debug, Clone, Serialize)]
+pub struct Summary {
+    /// Where the run lies.
+    pub folder: PathBuf,
+    /// Environment steps played.
+    pub steps_env: u64,
+    /// Seconds that training took, since it began or was resumed.
+    pub wall_s: f64,
+    /// Environment steps a second in that time, everything included.
+    pub steps_per_s: f64,
+}
+
+/// Makes the run that `config` describes, in `world`, and keeps metrics, checkpoints, status and weights in a new folder at `path`.
+///
+/// # Errors
+/// [`RunError::Interrupted`] when asked to stop, after a checkpoint; [`RunError::FolderInUse`], [`RunError::UnfinishedRun`] or
+/// [`RunError::FolderLocked`] if something lies at `path`, before anything is written; otherwise what went wrong.
+pub fn train(
+    path: &Path,
+    config: &Config,
+    world: &World,
+    threads: usize,
+    stop: &StopRequest,
+    observer: &mut dyn Observer,
+) -> Result<Summary> {
+    RunFolder::check_free(path)?;
+    let trainer = Trainer::in_world(config, world, threads)?;
+    let mut training = Reporting::new(trainer, config, stop);
+    let mut folder = RunFolder::create(path, config, threads)?;
+    train_into(&mut folder, &mut training, config, stop, observer)
+}
+
+/// Continues the run at `path` to its end, in what `world` makes of its configuration; gives nothing if it is there already. From
+/// its latest intact checkpoint on it is as if it had never stopped.
+///
+/// # Errors
+/// [`RunError::Interrupted`] when asked to stop; otherwise what went wrong.
+pub fn resume(
+    path: &Path,
+    world: impl FnOnce(&Config) -> Result<World, mackrl::Error>,
+    threads: usize,
+    stop: &StopRequest,
+    observer: &mut dyn Observer,
+) -> Result<Option<Summary>> {
+    if RunFolder::is_finished(path) {
+        return Ok(None);
+    }
+    let Resumption {
+        mut folder,
+        config,
+        checkpoint,
+        damaged,
+        earlier_code,
+    } = RunFolder::resume(path, threads)?;
+    for damage in damaged {
+        observer.warn(&format!("{damage}; an earlier one is used"));
+    }
+    if let Some(code) = earlier_code {
+        observer.warn(&format!(
+            "the run was made by code {code} and goes on with {CODE}: it may not be what either of them makes alone"
+        ));
+    }
+    let world = world(&config)?;
+    let trainer = match checkpoint {
+        Some(checkpoint) => Trainer::resumed(&config, &world, threads, &checkpoint)?,
+        None => Trainer::in_world(&config, &world, threads)?,
+    };
+    let mut training = Reporting::new(trainer, &config, stop);
+    train_into(&mut folder, &mut training, &config, stop, observer).map(Some)
+}
+
+/// Trains to the end, or until asked to stop.
+fn train_into(
+    folder: &mut RunFolder,
+    training: &mut impl Training,
+    config: &Config,
+    stop: &StopRequest,
+    observer: &mut dyn Observer,
+) -> Result<Summary> {
+    observer.begin(&training.standing());
+    let outcome = continue_into(folder, training, config, stop, observer);
+    observer.end();
+    let recorded = folder.set_status(match &outcome {
+        Ok(_) => Status::Finished,
+        Err(error) if error.is_interruption() => Status::Interrupted,
+        Err(_) => Status::Failed,
+    });
+    // What stopped the training matters more than a status that cannot be written.
+    let summary = outcome?;
+    recorded?;
+    Ok(summary)
+}
+
+fn continue_into(
+    folder: &mut RunFolder,
+    training: &mut impl Training,
+    config: &Config,
+    stop: &StopRequest,
+    observer: &mut dyn Observer,
+) -> Result<Summary> {
+    let start = Instant::now();
+    let steps_env_before = training.standing().steps_env;
+    if config.run.tensorboard {
+        folder.write_events(steps_env_before)?;
+    }
+    let interval = config.run.checkpoint_interval_steps_env;
+    let mut intervals = steps_env_before / interval;
+    while !training.finished() {
+        if stop.is_made() {
+            folder.write_checkpoint(training.iterations(), &training.checkpoint())?;
+            return Err(RunError::Interrupted {
+                folder: folder.path().to_owned(),
+                steps_env: training.standing().steps_env,
+            });
+        }
+        let Update { metrics, standing } = match training.update() {
+            // What was begun was given up; the checkpoint is that of the moment before.
+            Err(mackrl::Error::Stopped) => continue,
+            Err(mackrl::Error::NotFinite(number)) => {
+                return Err(RunError::UpdateRefused {
+                    number,
+                    folder: folder.path().to_owned(),
+                });
+            }
+            outcome => outcome?,
+        };
+        if let Some(metrics) = metrics {
+            folder.append_metrics(&metrics)?;
+        }
+        observer.progress(&standing);
+        if standing.steps_env / interval > intervals {
+            intervals = standing.steps_env / interval;
+            folder.write_checkpoint(training.iterations(), &training.checkpoint())?;
+        }
+    }
+    folder.write_checkpoint(training.iterations(), &training.checkpoint())?;
+    folder.write_weights(&training.weights())?;
+    let wall_s = start.elapsed().as_secs_f64();
+    let steps_env = training.standing().steps_env;
+    Ok(Summary {
+        folder: folder.path().to_owned(),
+        steps_env,
+        wall_s,
+        steps_per_s: (steps_env - steps_env_before) as f64 / wall_s.max(1e-9),
+    })
+}
+
+/// What one update gave.
+#[derive(Debug, Clone, PartialEq)]
+struct Update {
+    /// A row of metrics as one JSON object, without a line break, if one was due.
+    metrics: Option<String>,
+    /// How the run stands.
+    standing: Standing,
+}
+
+/// Something that learns from one batch of episodes after the other.
+trait Training {
+    /// Plays and learns from one batch.
+    fn update(&mut self) -> Result<Update, mackrl::Error>;
+    /// Whether the configured number of steps has been played.
+    fn finished(&self) -> bool;
+    /// How the run stands.
+    fn standing(&self) -> Standing;
+    /// Updates and tests so far, the same number at the same point of every repetition.
+    fn iterations(&self) -> u64;
+    /// Everything that the rest of the run depends on.
+    fn checkpoint(&self) -> Checkpoint;
+    /// The weights as safetensors.
+    fn weights(&self) -> Vec<u8>;
+}
+
+/// A trainer, and what it last reported.
+struct Reporting {
+    trainer: Trainer,
+    standing: Standing,
+    provenance: String,
+}
+
+impl Reporting {
+    /// A trainer of the run that `config` describes, at its beginning or restored, that gives up when asked to stop.
+    fn new(mut trainer: Trainer, config: &Config, stop: &StopRequest) -> Self {
+        trainer.stop_when(stop.flag());
+        let standing = Standing {
+            steps_env: trainer.steps_env(),
+            steps_env_total: config.run.steps_env,
+            ..Standing::default()
+        };
+        Self {
+            trainer,
+            standing,
+            provenance: Provenance::of_run(config).id,
+        }
+    }
+}
+
+impl Training for Reporting {
+    fn update(&mut self) -> Result<Update, mackrl::Error> {
+        let row = self.trainer.update()?;
+        self.standing.steps_env = self.trainer.steps_env();
+        if let Some(row) = &row {
+            let latest = |name, before| row.get(name).or(before);
+            let Standing {
+                battle_won_mean,
+                delegation_rate,
+                ..
+            } = self.standing;
+            self.standing.battle_won_mean = latest("test_battle_won_mean", battle_won_mean);
+            self.standing.delegation_rate = latest("mackrl/delegation_rate", delegation_rate);
+        }
+        let metrics = row.map(|metrics| Row {
+            metrics,
+            provenance: &self.provenance,
+        });
+        let json = |row: Row<'_>| serde_json::to_string(&row).expect("numbers can be written");
+        Ok(Update {
+            metrics: metrics.map(json),
+            standing: self.standing,
+        })
+    }
+
+    fn finished(&self) -> bool {
+        self.trainer.finished()
+    }
+
+    fn standing(&self) -> Standing {
+        self.standing
+    }
+
+    fn iterations(&self) -> u64 {
+        self.trainer.iterations()
+    }
+
+    fn checkpoint(&self) -> Checkpoint {
+        self.trainer.checkpoint()
+    }
+
+    fn weights(&self) -> Vec<u8> {
+        self.trainer.weights()
+    }
+}
+
+/// A line of `metrics.jsonl`.
+#[derive(Debug, Serialize)]
+struct Row<'a> {
+    #[serde(flatten)]
+    metrics: MetricRow,
+    /// Id of the provenance, which stands in `run.json`.
+    provenance: &'a str,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run_folder::Run;
+
+    /// Learns nothing; fails at the update given by `fails_at`, and is asked to stop during the one given by `stops_at`.
+    #[derive(Default)]
+    struct Counting {
+        updates: u64,
+        fails_at: Option<u64>,
+        stops_at: Option<u64>,
+        stop: StopRequest,
+    }
+
+    impl Training for Counting {
+        fn update(&mut self) -> Result<Update, mackrl::Error> {
+            self.updates += 1;
+            if self.fails_at == Some(self.updates) {
+                return Err(mackrl::Error::Data("planted".to_owned()));
+            }
+            if self.stops_at == Some(self.updates) {
+                self.stop.make();
+            }
+            Ok(Update {
+                metrics: Some(format!("{{\"t_env\":{}}}", self.updates)),
+                standing: self.standing(),
+            })
+        }
+
+        fn finished(&self) -> bool {
+            self.updates >= 3
+        }
+
+        fn standing(&self) -> Standing {
+            Standing {
+                steps_env: self.updates,
+                ..Standing::default()
+            }
+        }
+
+        fn iterations(&self) -> u64 {
+            self.updates
+        }
+
+        fn checkpoint(&self) -> Checkpoint {
+            Checkpoint {
+                tensors: vec![5],
+                counters: self.updates.to_le_bytes().to_vec(),
+            }
+        }
+
+        fn weights(&self) -> Vec<u8> {
+            vec![7, 11]
+        }
+    }
+
+    fn run(mut training: Counting) -> (tempfile::TempDir, PathBuf, Result<Summary>) {
+        let parent = tempfile::tempdir().unwrap();
+        let path = parent.path().join("run");
+        let mut config = Config::default();
+        config.run.checkpoint_interval_steps_env = 2;
+        let mut folder = RunFolder::create(&path, &config, 1).unwrap();
+        let stop = training.stop.clone();
+        let outcome = train_into(&mut folder, &mut training, &config, &stop, &mut ());
+        (parent, path, outcome)
+    }
+
+    fn status(path: &Path) -> String {
+        let text = std::fs::read_to_string(path.join("run.json")).unwrap();
+        let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+        json["status"].as_str().unwrap().to_owned()
+    }
+
+    /// Updates at the latest checkpoint.
+    fn checkpoint(path: &Path) -> Option<Vec<u8>> {
+        let resumption = RunFolder::resume(path, 1).unwrap();
+        resumption.checkpoint.map(|checkpoint| checkpoint.counters)
+    }
+
+    #[test]
+    fn a_run_leaves_metrics_weights_a_checkpoint_and_its_status() {
+        let (_parent, path, outcome) = run(Counting::default());
+        assert_eq!(outcome.unwrap().steps_env, 3);
+        let metrics = std::fs::read_to_string(path.join("metrics.jsonl")).unwrap();
+        assert_eq!(metrics, "{\"t_env\":1}\n{\"t_env\":2}\n{\"t_env\":3}\n");
+        assert_eq!(Run::open(&path).unwrap().weights, [7, 11]);
+        assert_eq!(status(&path), "finished");
+        assert_eq!(checkpoint(&path), Some(3_u64.to_le_bytes().to_vec()));
+    }
+
+    #[test]
+    fn a_run_that_fails_keeps_its_latest_checkpoint_and_says_so() {
+        let (_parent, path, outcome) = run(Counting {
+            fails_at: Some(3),
+            ..Counting::default()
+        });
+        assert!(outcome.is_err());
+        assert_eq!(status(&path), "failed");
+        assert!(!path.join("weights.safetensors").exists());
+        assert_eq!(Run::open(&path).unwrap().weights, [5]);
+        assert_eq!(checkpoint(&path), Some(2_u64.to_le_bytes().to_vec()));
+    }
+
+    #[test]
+    fn a_run_that_is_asked_to_stop_writes_a_checkpoint_first() {
+        let (_parent, path, outcome) = run(Counting {
+            stops_at: Some(1),
+            ..Counting::default()
+        });
+        let message = outcome.unwrap_err().to_string();
+        assert!(
+            message.ends_with("was interrupted at 1 environment steps"),
+            "{message}"
+        );
+        assert_eq!(status(&path), "interrupted");
+        assert_eq!(checkpoint(&path), Some(1_u64.to_le_bytes().to_vec()));
+    }
+}
