@@ -7,9 +7,17 @@ use std::{
     time::{Duration, Instant},
 };
 
+use tungstenite::{
+    handshake::client::generate_key,
+    protocol::frame::{
+        FrameSocket,
+        coding::{Control, Data, OpCode},
+    },
+};
+
 use super::{
     MESSAGE_LENGTH_MAX, WebsocketError,
-    frame::{self, Opcode},
+    frame::{self, BINARY, CLOSE, PONG},
     handshake,
 };
 
@@ -18,7 +26,7 @@ use super::{
 /// After an error the connection is of no more use: a message may have been cut in two.
 #[derive(Debug)]
 pub struct Connection {
-    input: BufReader<Timed>,
+    socket: FrameSocket<Timed>,
     is_client: bool,
     /// Source of masks, which only have to differ.
     masks: (RandomState, u64),
@@ -38,16 +46,13 @@ impl Connection {
     /// If nobody listens there, or it is no game.
     pub fn connect(address: SocketAddr, patience: Duration) -> Result<Self, WebsocketError> {
         let stream = TcpStream::connect_timeout(&address, patience)?;
-        let mut connection = Self::new(stream, true)?;
-        connection.wait_at_most(Some(patience));
-        let mut nonce = [0; 16];
-        nonce[..8].copy_from_slice(&connection.random().to_le_bytes());
-        nonce[8..].copy_from_slice(&connection.random().to_le_bytes());
-        let key = handshake::key(nonce);
-        connection.write(handshake::request(&address.to_string(), &key).as_bytes())?;
-        let head = handshake::read_head(&mut connection.input).map_err(name_lateness(patience))?;
+        let mut input = Timed::begin(stream, patience)?;
+        let key = generate_key();
+        let request = handshake::request(&address.to_string(), &key);
+        write(input.get_mut(), request.as_bytes())?;
+        let head = handshake::read_head(&mut input).map_err(name_lateness(patience))?;
         handshake::check_answer(&head, &key)?;
-        Ok(connection)
+        Ok(Self::open(input, true))
     }
 
     /// Answers a client that has connected, within `patience`.
@@ -55,13 +60,12 @@ impl Connection {
     /// # Errors
     /// If it does not ask for the game's websocket; it has been told then.
     pub fn accept(stream: TcpStream, patience: Duration) -> Result<Self, WebsocketError> {
-        let mut connection = Self::new(stream, false)?;
-        connection.wait_at_most(Some(patience));
-        let head = handshake::read_head(&mut connection.input).map_err(name_lateness(patience))?;
+        let mut input = Timed::begin(stream, patience)?;
+        let head = handshake::read_head(&mut input).map_err(name_lateness(patience))?;
         let (response, is_granted) = handshake::answer(&head);
-        connection.write(response.as_bytes())?;
+        write(input.get_mut(), response.as_bytes())?;
         if is_granted {
-            Ok(connection)
+            Ok(Self::open(input, false))
         } else {
             Err(WebsocketError::protocol(format!(
                 "a client asked for something else: {:?}",
@@ -85,7 +89,7 @@ impl Connection {
         patience: Option<Duration>,
     ) -> Result<(), WebsocketError> {
         self.wait_at_most(patience);
-        self.send_frame(Opcode::Binary, message)
+        self.send_frame(BINARY, message)
     }
 
     /// Receives one message, however it is marked; waits for ever without `patience`. Pings are answered on the way.
@@ -101,77 +105,64 @@ impl Connection {
     /// Sends bytes as they are, whatever they mean to the peer.
     #[cfg(test)]
     pub(super) fn send_unframed(&mut self, bytes: &[u8]) -> Result<(), WebsocketError> {
-        self.write(bytes)
+        write(self.socket.get_mut(), bytes)
     }
 
-    fn new(stream: TcpStream, is_client: bool) -> Result<Self, WebsocketError> {
-        stream.set_nodelay(true)?;
-        Ok(Self {
-            input: BufReader::new(Timed {
-                stream,
-                deadline: None,
-            }),
+    /// The websocket that begins behind the head that was read from `input`.
+    fn open(input: BufReader<Timed>, is_client: bool) -> Self {
+        let behind = input.buffer().to_vec();
+        Self {
+            socket: FrameSocket::from_partially_read(input.into_inner(), behind),
             is_client,
             masks: (RandomState::new(), 0),
-        })
+        }
     }
 
     fn wait_at_most(&mut self, patience: Option<Duration>) {
-        let deadline = patience.map(|patience| (Instant::now() + patience, patience));
-        self.input.get_mut().deadline = deadline;
+        self.socket.get_mut().deadline = deadline(patience);
     }
 
     fn receive_message(&mut self) -> Result<Vec<u8>, WebsocketError> {
         let mut message: Option<Vec<u8>> = None;
         loop {
             let room = MESSAGE_LENGTH_MAX - message.as_ref().map_or(0, Vec::len);
-            let frame = frame::read(&mut self.input, !self.is_client, room)?;
-            match (frame.opcode, &mut message) {
-                (Opcode::Close, _) => {
+            let (opcode, is_final, payload) = frame::read(&mut self.socket, !self.is_client, room)?;
+            match (opcode, &mut message) {
+                (OpCode::Control(Control::Close), _) => {
                     // The peer may have gone already; it is the end either way.
-                    let _ = self.send_frame(Opcode::Close, &[]);
+                    let _ = self.send_frame(CLOSE, &[]);
                     return Err(WebsocketError::Closed);
                 }
-                (Opcode::Ping, _) => {
-                    self.send_frame(Opcode::Pong, &frame.payload)?;
+                (OpCode::Control(Control::Ping), _) => {
+                    self.send_frame(PONG, &payload)?;
                     continue;
                 }
-                (Opcode::Pong, _) => continue,
-                (Opcode::Continuation, Some(message)) => message.extend(frame.payload),
-                (Opcode::Text | Opcode::Binary, None) => message = Some(frame.payload),
-                (Opcode::Continuation, None) => {
+                (OpCode::Control(_), _) => continue,
+                (OpCode::Data(Data::Continue), Some(message)) => message.extend(payload),
+                (OpCode::Data(Data::Continue), None) => {
                     return Err(WebsocketError::protocol(
                         "a message that begins in its middle",
                     ));
                 }
-                (Opcode::Text | Opcode::Binary, Some(_)) => {
+                (OpCode::Data(_), None) => message = Some(payload),
+                (OpCode::Data(_), Some(_)) => {
                     return Err(WebsocketError::protocol("a message within a message"));
                 }
             }
-            if frame.is_final {
+            if is_final {
                 return Ok(message.unwrap_or_default());
             }
         }
     }
 
-    fn send_frame(&mut self, opcode: Opcode, payload: &[u8]) -> Result<(), WebsocketError> {
+    fn send_frame(&mut self, opcode: OpCode, payload: &[u8]) -> Result<(), WebsocketError> {
         let mask = self.is_client.then(|| {
             let [a, b, c, d, ..] = self.random().to_le_bytes();
             [a, b, c, d]
         });
-        self.write(&frame::encode(opcode, payload, mask))
-    }
-
-    fn write(&mut self, bytes: &[u8]) -> Result<(), WebsocketError> {
-        let patience = self
-            .input
-            .get_ref()
-            .deadline
-            .map_or(Duration::ZERO, |(_, patience)| patience);
-        let timed = self.input.get_mut();
-        timed
-            .write_all(bytes)
-            .map_err(|error| name_lateness(patience)(error.into()))
+        let late = name_lateness(self.socket.get_ref().patience());
+        let sent = self.socket.send(frame::whole(opcode, payload, mask));
+        sent.map_err(|error| late(frame::in_words(error)))
     }
 
     fn random(&mut self) -> u64 {
@@ -181,6 +172,20 @@ impl Connection {
 }
 
 impl Timed {
+    /// A socket on which a handshake has to end within `patience`.
+    fn begin(stream: TcpStream, patience: Duration) -> io::Result<BufReader<Self>> {
+        stream.set_nodelay(true)?;
+        Ok(BufReader::new(Self {
+            stream,
+            deadline: deadline(Some(patience)),
+        }))
+    }
+
+    fn patience(&self) -> Duration {
+        self.deadline
+            .map_or(Duration::ZERO, |(_, patience)| patience)
+    }
+
     /// What is left of the time, as sockets want it.
     fn rest(&self) -> io::Result<Option<Duration>> {
         let Some((deadline, _)) = self.deadline else {
@@ -210,6 +215,15 @@ impl Write for Timed {
     fn flush(&mut self) -> io::Result<()> {
         self.stream.flush()
     }
+}
+
+fn deadline(patience: Option<Duration>) -> Option<(Instant, Duration)> {
+    patience.map(|patience| (Instant::now() + patience, patience))
+}
+
+fn write(timed: &mut Timed, bytes: &[u8]) -> Result<(), WebsocketError> {
+    let late = name_lateness(timed.patience());
+    timed.write_all(bytes).map_err(|error| late(error.into()))
 }
 
 /// Calls the operating system's word for it lateness.

@@ -2,13 +2,10 @@
 
 use std::io::{BufRead, Read};
 
-use base64::{Engine, engine::general_purpose::STANDARD};
-use sha1::{Digest, Sha1};
+use tungstenite::handshake::derive_accept_key;
 
 use super::{PATH, WebsocketError};
 
-/// The standard's constant that is hashed with the client's key.
-const SALT: &str = "258EAFA5-E914-47DA-95CA-C5AB0DC85B11";
 /// Greatest length of an HTTP head in bytes.
 const HEAD_LENGTH_MAX: usize = 8 << 10;
 
@@ -47,7 +44,7 @@ pub(super) fn answer(head: &str) -> (String, bool) {
     let response = format!(
         "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
          Sec-WebSocket-Accept: {}\r\n\r\n",
-        accept(key)
+        derive_accept_key(key.as_bytes())
     );
     (response, true)
 }
@@ -56,18 +53,15 @@ pub(super) fn answer(head: &str) -> (String, bool) {
 pub(super) fn check_answer(head: &str, key: &str) -> Result<(), WebsocketError> {
     let status = head.lines().next().unwrap_or_default();
     let is_switching = status.split(' ').nth(1) == Some("101");
-    if is_switching && header(head, "sec-websocket-accept") == Some(&accept(key)) {
+    if is_switching
+        && header(head, "sec-websocket-accept") == Some(&derive_accept_key(key.as_bytes()))
+    {
         return Ok(());
     }
     let status: String = status.chars().take(80).collect();
     Err(WebsocketError::protocol(format!(
         "the server answers {status:?}"
     )))
-}
-
-/// A key from 16 bytes.
-pub(super) fn key(bytes: [u8; 16]) -> String {
-    STANDARD.encode(bytes)
 }
 
 /// Reads up to the empty line that ends a head.
@@ -88,11 +82,6 @@ pub(super) fn read_head(input: &mut impl BufRead) -> Result<String, WebsocketErr
     )))
 }
 
-/// What the server has to make of the client's key, so that it is known to be a websocket server.
-fn accept(key: &str) -> String {
-    STANDARD.encode(Sha1::new().chain_update(key).chain_update(SALT).finalize())
-}
-
 fn header<'a>(head: &'a str, name: &str) -> Option<&'a str> {
     head.lines().skip(1).find_map(|line| {
         let (key, value) = line.split_once(':')?;
@@ -107,7 +96,7 @@ mod tests {
     #[test]
     fn a_key_is_answered_as_in_the_example_of_the_standard() {
         assert_eq!(
-            accept("dGhlIHNhbXBsZSBub25jZQ=="),
+            derive_accept_key(b"dGhlIHNhbXBsZSBub25jZQ=="),
             "s3pPLMBiTxaQ9kYGzzhZRbK+xOo="
         );
     }

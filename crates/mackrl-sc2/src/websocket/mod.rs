@@ -1,8 +1,10 @@
 //! Websockets (RFC 6455), as far as StarCraft II and its clients use them.
 //!
-//! Both ends are here. Two things made it ours instead of a library's: clients of the game send protobuf bytes in frames that
-//! are marked as *text*, which libraries rightly refuse as invalid UTF-8, and every exchange has to end by a deadline on a plain
-//! blocking socket. Messages are bounded in both directions, and nothing that a peer sends makes this code panic.
+//! Both ends are here. Frames are tungstenite's `FrameSocket`. Its `WebSocket` cannot be used: clients of the game send protobuf
+//! bytes in frames that are marked as *text*, which it rightly refuses as invalid UTF-8. So messages are put together here
+//! ([`Connection`]), and the handshake is ours because tungstenite's drops a request that asks for something else without an
+//! answer, where the game's clients wait for one. Every exchange ends by a deadline on a plain blocking socket, messages are
+//! bounded in both directions, and nothing that a peer sends makes this code panic.
 
 mod connection;
 mod frame;

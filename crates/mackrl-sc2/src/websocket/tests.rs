@@ -8,12 +8,34 @@ use std::{
 
 use proptest::prelude::*;
 
+use tungstenite::protocol::frame::{
+    FrameSocket,
+    coding::{Control, Data, OpCode},
+};
+
 use super::{
-    frame::{Frame, Opcode, encode, read},
+    frame::{BINARY, whole},
     *,
 };
 
 const PATIENCE: Duration = Duration::from_secs(5);
+
+/// A frame as it goes over the wire.
+fn encode(opcode: OpCode, payload: &[u8], mask: Option<[u8; 4]>) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let frame = whole(opcode, payload, mask);
+    frame.format(&mut bytes).unwrap();
+    bytes
+}
+
+/// What is read from bytes that came over the wire.
+fn read(
+    bytes: &[u8],
+    is_masked: bool,
+    room: usize,
+) -> Result<(OpCode, bool, Vec<u8>), WebsocketError> {
+    frame::read(&mut FrameSocket::new(bytes), is_masked, room)
+}
 
 /// A server that plays its part in a thread, and its address.
 fn serve<T: Send + 'static>(
@@ -52,7 +74,7 @@ fn bytes_in_frames_marked_as_text_are_taken_as_bytes() {
     let mut client = Connection::connect(address, PATIENCE).unwrap();
     client
         .send_unframed(&encode(
-            Opcode::Text,
+            OpCode::Data(Data::Text),
             &[0xFF, 0xFE, 0x00],
             Some([1, 2, 3, 4]),
         ))
@@ -65,14 +87,14 @@ fn a_message_in_parts_is_put_together_and_pings_in_between_are_answered() {
     let (address, server) = serve(echo);
     let mut client = Connection::connect(address, PATIENCE).unwrap();
     let mask = Some([9, 8, 7, 6]);
-    let mut first = encode(Opcode::Binary, b"ab", mask);
+    let mut first = encode(BINARY, b"ab", mask);
     first[0] &= 0x7F;
     client.send_unframed(&first).unwrap();
     client
-        .send_unframed(&encode(Opcode::Ping, b"?", mask))
+        .send_unframed(&encode(OpCode::Control(Control::Ping), b"?", mask))
         .unwrap();
     client
-        .send_unframed(&encode(Opcode::Continuation, b"c", mask))
+        .send_unframed(&encode(OpCode::Data(Data::Continue), b"c", mask))
         .unwrap();
     assert_eq!(server.join().unwrap().unwrap(), b"abc");
     assert_eq!(client.receive(Some(PATIENCE)).unwrap(), b"abc");
@@ -107,23 +129,43 @@ fn a_request_for_another_path_is_told_so() {
 #[test]
 fn a_length_alone_claims_no_memory() {
     let frame = [0x82, 0x7F, 0, 0, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF];
-    let error = read(&mut &frame[..], false, MESSAGE_LENGTH_MAX).unwrap_err();
+    let error = read(&frame, false, MESSAGE_LENGTH_MAX).unwrap_err();
     assert!(matches!(error, WebsocketError::Protocol(_)), "{error}");
     let short = [0x82, 0x7F, 0, 0, 0, 0, 0, 0xFF, 0, 0];
-    let error = read(&mut &short[..], false, MESSAGE_LENGTH_MAX).unwrap_err();
+    let error = read(&short, false, MESSAGE_LENGTH_MAX).unwrap_err();
     assert!(matches!(error, WebsocketError::Closed), "{error}");
+}
+
+#[test]
+fn what_the_standard_forbids_is_refused() {
+    let mask = Some([1, 2, 3, 4]);
+    let refused = |frame: &[u8], is_masked: bool| {
+        let error = read(frame, is_masked, 200).unwrap_err();
+        assert!(matches!(error, WebsocketError::Protocol(_)), "{error}");
+        error.to_string()
+    };
+    assert!(refused(&encode(BINARY, b"a", mask), false).contains("expected a unmasked frame"));
+    assert!(refused(&encode(BINARY, b"a", None), true).contains("expected a masked frame"));
+    assert!(refused(&encode(BINARY, &[0; 201], mask), true).contains("201"));
+    let ping = OpCode::Control(Control::Ping);
+    assert!(
+        refused(&encode(ping, &[0; 126], mask), true).contains("126 bytes, expected at most 125")
+    );
+    assert!(refused(&[0x09, 0x00], false).contains("a control frame in parts"));
+    assert!(refused(&[0xC2, 0x00], false).contains("reserved bits"));
+    refused(&[0x83, 0x00], false);
 }
 
 proptest! {
     #[test]
     fn a_frame_survives_the_wire(payload: Vec<u8>, mask: Option<[u8; 4]>) {
-        let bytes = encode(Opcode::Binary, &payload, mask);
-        let frame = read(&mut &bytes[..], mask.is_some(), MESSAGE_LENGTH_MAX).unwrap();
-        prop_assert_eq!(frame, Frame { is_final: true, opcode: Opcode::Binary, payload });
+        let bytes = encode(BINARY, &payload, mask);
+        let frame = read(&bytes, mask.is_some(), MESSAGE_LENGTH_MAX).unwrap();
+        prop_assert_eq!(frame, (BINARY, true, payload));
     }
 
     #[test]
     fn no_bytes_make_the_reader_panic(bytes: Vec<u8>, is_masked: bool) {
-        let _ = read(&mut &bytes[..], is_masked, 1000);
+        let _ = read(&bytes, is_masked, 1000);
     }
 }
