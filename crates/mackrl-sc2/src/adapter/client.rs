@@ -33,7 +33,7 @@ impl Client {
         &mut self,
         kind: request::Kind,
     ) -> Result<(response::Kind, Status), GameFault> {
-        let name = name(&kind);
+        let name = kind.name();
         self.asked += 1;
         let request = Request {
             kind: Some(kind),
@@ -85,23 +85,5 @@ impl Client {
             (None, _) => Err(GameFault::garbage(name, "no answer in the response")),
             (_, None) => Err(GameFault::garbage(name, "no status in the response")),
         }
-    }
-}
-
-/// What a question is called in messages.
-const fn name(kind: &request::Kind) -> &'static str {
-    use request::Kind;
-    match kind {
-        Kind::CreateGame(_) => "create_game",
-        Kind::JoinGame(_) => "join_game",
-        Kind::Quit(_) => "quit",
-        Kind::GameInfo(_) => "game_info",
-        Kind::Observation(_) => "observation",
-        Kind::Action(_) => "action",
-        Kind::Step(_) => "step",
-        Kind::Data(_) => "data",
-        Kind::SaveReplay(_) => "save_replay",
-        Kind::Ping(_) => "ping",
-        Kind::Debug(_) => "debug",
     }
 }

@@ -103,6 +103,7 @@ impl Game {
             options: Some(InterfaceOptions {
                 raw: Some(true),
                 score: Some(false),
+                ..InterfaceOptions::default()
             }),
         };
         let answer = self.ask(request::Kind::JoinGame(join))?;

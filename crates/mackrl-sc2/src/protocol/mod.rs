@@ -13,12 +13,13 @@ pub use requests::{
     Action, ActionChat, ActionRaw, CreateGame, DebugCommand, DebugKillUnit, InterfaceOptions,
     JoinGame, LocalMap, PlayerSetup, Request, RequestAction, RequestData, RequestDebug,
     RequestGameInfo, RequestObservation, RequestPing, RequestQuit, RequestSaveReplay, RequestStep,
-    UnitCommand, debug_command, request, unit_command,
+    UnitCommand, Unread, debug_command, request, unit_command,
 };
 pub use responses::{
-    Observation, ObservationRaw, PlayerInfo, Response, ResponseAction, ResponseCreateGame,
-    ResponseData, ResponseDebug, ResponseGameInfo, ResponseJoinGame, ResponseObservation,
-    ResponsePing, ResponseQuit, ResponseSaveReplay, ResponseStep, StartRaw, UnitTypeData, response,
+    Observation, ObservationRaw, PlayerCommon, PlayerInfo, Response, ResponseAction,
+    ResponseCreateGame, ResponseData, ResponseDebug, ResponseGameInfo, ResponseJoinGame,
+    ResponseObservation, ResponsePing, ResponseQuit, ResponseSaveReplay, ResponseStep, StartRaw,
+    UnitTypeData, response,
 };
 pub use units::Unit;
 

@@ -8,7 +8,7 @@ pub struct Request {
     /// The question.
     #[prost(
         oneof = "request::Kind",
-        tags = "1, 2, 8, 9, 10, 11, 12, 13, 15, 19, 20"
+        tags = "1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22"
     )]
     pub kind: Option<request::Kind>,
     /// Comes back in the answer.
@@ -20,7 +20,7 @@ pub struct Request {
 pub mod request {
     use super::{
         CreateGame, JoinGame, RequestAction, RequestData, RequestDebug, RequestGameInfo,
-        RequestObservation, RequestPing, RequestQuit, RequestSaveReplay, RequestStep,
+        RequestObservation, RequestPing, RequestQuit, RequestSaveReplay, RequestStep, Unread,
     };
 
     /// The questions.
@@ -59,8 +59,76 @@ pub mod request {
         /// Change the game.
         #[prost(message, tag = "20")]
         Debug(RequestDebug),
+        /// Begin the game again.
+        #[prost(message, tag = "3")]
+        RestartGame(Unread),
+        /// Show a replay.
+        #[prost(message, tag = "4")]
+        StartReplay(Unread),
+        /// Leave the game.
+        #[prost(message, tag = "5")]
+        LeaveGame(Unread),
+        /// Keep the state of the game.
+        #[prost(message, tag = "6")]
+        QuickSave(Unread),
+        /// Go back to the state that was kept.
+        #[prost(message, tag = "7")]
+        QuickLoad(Unread),
+        /// Paths, abilities and places for buildings.
+        #[prost(message, tag = "14")]
+        Query(Unread),
+        /// What a replay file holds.
+        #[prost(message, tag = "16")]
+        ReplayInfo(Unread),
+        /// Which maps there are.
+        #[prost(message, tag = "17")]
+        AvailableMaps(Unread),
+        /// Keep a map file.
+        #[prost(message, tag = "18")]
+        SaveMap(Unread),
+        /// Move the camera of an observer.
+        #[prost(message, tag = "21")]
+        ObserverAction(Unread),
+        /// Start a trigger of the map.
+        #[prost(message, tag = "22")]
+        MapCommand(Unread),
+    }
+
+    impl Kind {
+        /// What the question is called in the protocol.
+        #[must_use]
+        pub const fn name(&self) -> &'static str {
+            match self {
+                Self::CreateGame(_) => "create_game",
+                Self::JoinGame(_) => "join_game",
+                Self::Quit(_) => "quit",
+                Self::GameInfo(_) => "game_info",
+                Self::Observation(_) => "observation",
+                Self::Action(_) => "action",
+                Self::Step(_) => "step",
+                Self::Data(_) => "data",
+                Self::SaveReplay(_) => "save_replay",
+                Self::Ping(_) => "ping",
+                Self::Debug(_) => "debug",
+                Self::RestartGame(_) => "restart_game",
+                Self::StartReplay(_) => "start_replay",
+                Self::LeaveGame(_) => "leave_game",
+                Self::QuickSave(_) => "quick_save",
+                Self::QuickLoad(_) => "quick_load",
+                Self::Query(_) => "query",
+                Self::ReplayInfo(_) => "replay_info",
+                Self::AvailableMaps(_) => "available_maps",
+                Self::SaveMap(_) => "save_map",
+                Self::ObserverAction(_) => "obs_action",
+                Self::MapCommand(_) => "map_command",
+            }
+        }
     }
 }
+
+/// A message that may be there, whose content is not read.
+#[derive(Clone, Copy, PartialEq, Eq, prost::Message)]
+pub struct Unread {}
 
 /// Asks for a game.
 #[derive(Clone, PartialEq, Eq, prost::Message)]
@@ -124,6 +192,12 @@ pub struct InterfaceOptions {
     /// The score.
     #[prost(bool, optional, tag = "2")]
     pub score: Option<bool>,
+    /// Layers of features, as images.
+    #[prost(message, optional, tag = "3")]
+    pub feature_layer: Option<Unread>,
+    /// Rendered images.
+    #[prost(message, optional, tag = "4")]
+    pub render: Option<Unread>,
 }
 
 /// Asks for what does not change.

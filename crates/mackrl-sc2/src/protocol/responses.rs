@@ -126,6 +126,9 @@ pub struct PlayerInfo {
     /// The people that it asked for.
     #[prost(enumeration = "super::Race", optional, tag = "3")]
     pub race_requested: Option<i32>,
+    /// How well it plays, if the game itself plays it.
+    #[prost(int32, optional, tag = "5")]
+    pub difficulty: Option<i32>,
 }
 
 /// The ground.
@@ -156,12 +159,23 @@ pub struct ResponseObservation {
 /// What is to be seen.
 #[derive(Clone, PartialEq, prost::Message)]
 pub struct Observation {
+    /// Who looks.
+    #[prost(message, optional, tag = "1")]
+    pub player_common: Option<PlayerCommon>,
     /// Units.
     #[prost(message, optional, tag = "5")]
     pub raw_data: Option<ObservationRaw>,
     /// Loops since the game began.
     #[prost(uint32, optional, tag = "9")]
     pub game_loop: Option<u32>,
+}
+
+/// The player who looks.
+#[derive(Clone, Copy, PartialEq, Eq, prost::Message)]
+pub struct PlayerCommon {
+    /// Its number.
+    #[prost(uint32, optional, tag = "1")]
+    pub player_id: Option<u32>,
 }
 
 /// Units.

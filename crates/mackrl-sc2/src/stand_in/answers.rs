@@ -9,15 +9,17 @@ use mackrl_skirmish::{
 use super::arena::{Arena, owner};
 use crate::{
     protocol::{
-        ImageData, InterfaceOptions, Observation, ObservationRaw, PlayerInfo, PlayerType, Point,
-        PointI, RectangleI, ResponseData, ResponseGameInfo, ResponseObservation, ResponsePing,
-        Size2DI, StartRaw, Unit, UnitTypeData,
+        ImageData, InterfaceOptions, Observation, ObservationRaw, PlayerCommon, PlayerInfo,
+        PlayerType, Point, PointI, RectangleI, ResponseData, ResponseGameInfo, ResponseObservation,
+        ResponsePing, Size2DI, StartRaw, Unit, UnitTypeData,
     },
     units,
 };
 
 /// The least type number of the agents' units. The real game's lie in this region.
 const FIRST_ALLY_TYPE: u32 = 1970;
+/// The number of the player who is the client.
+pub(super) const AGENTS_PLAYER: u32 = 1;
 /// The version whose API this is.
 pub(super) const GAME_VERSION: &str = "4.10.0";
 /// The number of that version, which names its folder.
@@ -35,24 +37,29 @@ pub(super) fn ping() -> ResponsePing {
     }
 }
 
-/// The map.
-pub(super) fn game_info(arena: &Arena) -> ResponseGameInfo {
+/// The map. `difficulty` is what was asked of the computer: the enemies follow their map's order at every one.
+pub(super) fn game_info(arena: &Arena, difficulty: i32) -> ResponseGameInfo {
     let scenario = arena.scenario();
-    let players = [(1, PlayerType::Participant), (2, PlayerType::Computer)];
+    let players = [
+        (AGENTS_PLAYER, PlayerType::Participant, None),
+        (AGENTS_PLAYER + 1, PlayerType::Computer, Some(difficulty)),
+    ];
     ResponseGameInfo {
         map_name: Some(scenario.name.clone()),
         local_map_path: Some(units::map_path(&scenario.name)),
         player_info: players
-            .map(|(number, kind)| PlayerInfo {
+            .map(|(number, kind, difficulty)| PlayerInfo {
                 player_id: Some(number),
                 r#type: Some(kind.into()),
                 race_requested: Some(race(scenario.races[number as usize - 1]).into()),
+                difficulty,
             })
             .into(),
         start_raw: Some(ground(arena)),
         options: Some(InterfaceOptions {
             raw: Some(true),
             score: Some(false),
+            ..InterfaceOptions::default()
         }),
     }
 }
@@ -63,6 +70,9 @@ pub(super) fn observation(arena: &Arena) -> ResponseObservation {
     let living = (0..state.units.len()).filter(|index| state.units[*index].is_alive());
     ResponseObservation {
         observation: Some(Observation {
+            player_common: Some(PlayerCommon {
+                player_id: Some(AGENTS_PLAYER),
+            }),
             raw_data: Some(ObservationRaw {
                 units: living.map(|index| unit(arena, index)).collect(),
             }),

@@ -16,9 +16,10 @@ use super::{
 };
 use crate::{
     protocol::{
-        Action, CreateGame, Request, RequestAction, RequestDebug, Response, ResponseAction,
-        ResponseCreateGame, ResponseDebug, ResponseJoinGame, ResponseQuit, ResponseSaveReplay,
-        ResponseStep, Status, UnitCommand, ability, debug_command, request, response, unit_command,
+        Action, CreateGame, DIFFICULTY_VERY_HARD, JoinGame, PlayerType, Request, RequestAction,
+        RequestDebug, Response, ResponseAction, ResponseCreateGame, ResponseDebug,
+        ResponseJoinGame, ResponseQuit, ResponseSaveReplay, ResponseStep, Status, UnitCommand,
+        ability, debug_command, request, response, unit_command,
     },
     units,
 };
@@ -34,6 +35,12 @@ const ERROR: i32 = 3;
 /// Errors of making a game, by the game's numbers.
 const MISSING_MAP: i32 = 1;
 const INVALID_MAP_PATH: i32 = 2;
+/// The error of joining with what is not there, by the game's number.
+const FEATURE_UNSUPPORTED: i32 = 7;
+
+/// What the stand-in does not serve, in a sentence.
+pub const NOT_SERVED: &str = "this is mackrl's stand-in, which serves SMAC's 23 maps to one client with raw observations, and not \
+    SMACv2, feature layers, rendered images, several clients, or bots that build";
 
 /// Writes an episode as a replay file.
 pub type ReplayWriter = Box<dyn Fn(&EpisodeRecord) -> Result<Vec<u8>, String> + Send>;
@@ -45,6 +52,8 @@ pub struct Game {
     units: UnitData,
     /// Seed of games whose client names none.
     seed: u64,
+    /// That of the computer, as the client asked for it.
+    difficulty: i32,
     replays: Option<ReplayWriter>,
 }
 
@@ -57,6 +66,7 @@ impl Game {
             arena: None,
             units,
             seed,
+            difficulty: DIFFICULTY_VERY_HARD,
             replays,
         }
     }
@@ -77,7 +87,9 @@ impl Game {
     pub fn answer(&mut self, request: &Request) -> Response {
         let answer = match &request.kind {
             Some(kind) => self.answer_kind(kind),
-            None => Err("a request of a kind that is not supported".to_owned()),
+            None => Err(format!(
+                "a request of a kind that is not known; {NOT_SERVED}"
+            )),
         };
         let (kind, error) = match answer {
             Ok(kind) => (Some(kind), Vec::new()),
@@ -111,8 +123,10 @@ impl Game {
                 response::Kind::Quit(ResponseQuit {})
             }
             Kind::CreateGame(create) => response::Kind::CreateGame(self.create(create)),
-            Kind::JoinGame(_) => response::Kind::JoinGame(self.join()?),
-            Kind::GameInfo(_) => response::Kind::GameInfo(answers::game_info(self.playing()?)),
+            Kind::JoinGame(join) => response::Kind::JoinGame(self.join(join)?),
+            Kind::GameInfo(_) => {
+                response::Kind::GameInfo(answers::game_info(self.playing()?, self.difficulty))
+            }
             Kind::Observation(_) => {
                 response::Kind::Observation(answers::observation(self.playing()?))
             }
@@ -121,6 +135,7 @@ impl Game {
             Kind::Step(step) => response::Kind::Step(self.step(step.count.unwrap_or(1))?),
             Kind::Debug(debug) => response::Kind::Debug(self.debug(debug)?),
             Kind::SaveReplay(_) => response::Kind::SaveReplay(self.save_replay()?),
+            other => return Err(format!("{} is not served; {NOT_SERVED}", other.name())),
         })
     }
 
@@ -141,6 +156,13 @@ impl Game {
             Ok(scenario) => {
                 let seed = create.random_seed.map_or(self.seed, u64::from);
                 self.arena = Some(Arena::new(scenario, seed));
+                let computer = create
+                    .player_setup
+                    .iter()
+                    .find(|player| player.r#type == Some(PlayerType::Computer.into()));
+                self.difficulty = computer
+                    .and_then(|computer| computer.difficulty)
+                    .unwrap_or(DIFFICULTY_VERY_HARD);
                 self.status = Status::InitGame;
                 ResponseCreateGame::default()
             }
@@ -148,16 +170,30 @@ impl Game {
         }
     }
 
-    fn join(&mut self) -> Result<ResponseJoinGame, String> {
+    fn join(&mut self, join: &JoinGame) -> Result<ResponseJoinGame, String> {
         if self.status != Status::InitGame {
             return Err(format!(
                 "cannot join a game in status {:?}, expected InitGame",
                 self.status
             ));
         }
+        let options = join.options.unwrap_or_default();
+        let wanted = [
+            (options.feature_layer, "feature layers"),
+            (options.render, "rendered images"),
+        ];
+        if let Some((_, name)) = wanted.iter().find(|(options, _)| options.is_some()) {
+            return Ok(ResponseJoinGame {
+                player_id: None,
+                error: Some(FEATURE_UNSUPPORTED),
+                error_details: Some(format!(
+                    "{name} are not served, join with raw observations alone; {NOT_SERVED}"
+                )),
+            });
+        }
         self.status = Status::InGame;
         Ok(ResponseJoinGame {
-            player_id: Some(1),
+            player_id: Some(answers::AGENTS_PLAYER),
             error: None,
             error_details: None,
         })
@@ -190,7 +226,9 @@ impl Game {
         let arena = self.playing_mut()?;
         for command in &request.debug {
             let Some(debug_command::Kind::KillUnit(kill)) = &command.kind else {
-                return Err("a debug command other than kill_unit is not supported".to_owned());
+                return Err(format!(
+                    "a debug command other than kill_unit is not served; {NOT_SERVED}"
+                ));
             };
             for tag in &kill.tag {
                 if let Some(unit) = arena.find(*tag) {
@@ -250,7 +288,7 @@ fn scenario(name: &str, data: UnitData) -> Result<Arc<Scenario>, String> {
         None => {
             let name: String = name.chars().take(80).collect();
             Err(format!(
-                "no map is called {name:?}, expected one of {}",
+                "no map is called {name:?}, expected one of {}; {NOT_SERVED}",
                 map_names().join(", ")
             ))
         }

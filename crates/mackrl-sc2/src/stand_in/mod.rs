@@ -17,7 +17,7 @@ mod server;
 pub(crate) use answers::race;
 pub use arena::{Arena, EpisodeRecord};
 pub use arguments::{GameArguments, InvalidArgument};
-pub use game::{Game, ReplayWriter};
+pub use game::{Game, NOT_SERVED, ReplayWriter};
 pub use server::{StandIn, StandInOptions};
 
 #[cfg(test)]

@@ -8,10 +8,10 @@ use super::*;
 use crate::{
     episode_name,
     protocol::{
-        Action, ActionChat, ActionRaw, CreateGame, DebugCommand, DebugKillUnit, JoinGame, LocalMap,
-        Point2D, Request, RequestAction, RequestDebug, RequestGameInfo, RequestObservation,
-        RequestPing, RequestSaveReplay, RequestStep, Response, Status, Unit, UnitCommand, ability,
-        debug_command, request, response, unit_command,
+        Action, ActionChat, ActionRaw, CreateGame, DebugCommand, DebugKillUnit, InterfaceOptions,
+        JoinGame, LocalMap, PlayerSetup, PlayerType, Point2D, Request, RequestAction, RequestDebug,
+        RequestGameInfo, RequestObservation, RequestPing, RequestSaveReplay, RequestStep, Response,
+        Status, Unit, UnitCommand, Unread, ability, debug_command, request, response, unit_command,
     },
     units,
 };
@@ -151,6 +151,99 @@ fn an_unknown_map_is_refused_with_the_names_of_all() {
         "{details}"
     );
     assert_eq!(response.status, Some(Status::Launched.into()));
+}
+
+#[test]
+fn players_are_numbered_and_the_computer_has_the_difficulty_that_was_asked_for() {
+    let mut client = Client {
+        game: Game::new(UnitData::Liberty, 1, None),
+        asked: 0,
+    };
+    let mut setup = create("3m", None);
+    setup.player_setup = vec![
+        PlayerSetup {
+            r#type: Some(PlayerType::Participant.into()),
+            ..PlayerSetup::default()
+        },
+        PlayerSetup {
+            r#type: Some(PlayerType::Computer.into()),
+            difficulty: Some(3),
+            ..PlayerSetup::default()
+        },
+    ];
+    client.ask(request::Kind::CreateGame(setup));
+    client.ask(request::Kind::JoinGame(JoinGame::default()));
+    let answer = client.ask(request::Kind::GameInfo(RequestGameInfo {}));
+    let response::Kind::GameInfo(info) = answer else {
+        panic!("{answer:?}");
+    };
+    let players = info.player_info.iter();
+    let told: Vec<_> = players
+        .map(|player| (player.player_id, player.difficulty))
+        .collect();
+    assert_eq!(told, [(Some(1), None), (Some(2), Some(3))]);
+    let answer = client.ask(request::Kind::Observation(RequestObservation::default()));
+    let response::Kind::Observation(seen) = answer else {
+        panic!("{answer:?}");
+    };
+    let common = seen.observation.unwrap().player_common.unwrap();
+    assert_eq!(common.player_id, Some(1));
+}
+
+/// Fields 14 (`query`) and 5 (`leave_game`) with contents that are not read, and field 90, which is none.
+#[test]
+fn a_request_that_is_not_served_is_named() {
+    let mut client = Client::playing("3m", None);
+    for (bytes, name) in [
+        (&[0x72, 0x02, 0x08, 0x01][..], "query is not served"),
+        (&[0x2A, 0x00], "leave_game is not served"),
+        (&[0xD2, 0x05, 0x00], "a request of a kind that is not known"),
+    ] {
+        let response = client.game.answer(&Request::decode(bytes).unwrap());
+        assert!(response.kind.is_none());
+        assert!(response.error[0].starts_with(name), "{response:?}");
+        assert!(response.error[0].ends_with(NOT_SERVED), "{response:?}");
+    }
+}
+
+#[test]
+fn images_are_refused_when_a_client_joins() {
+    let layers = InterfaceOptions {
+        raw: Some(true),
+        feature_layer: Some(Unread {}),
+        ..InterfaceOptions::default()
+    };
+    let rendered = InterfaceOptions {
+        render: Some(Unread {}),
+        ..InterfaceOptions::default()
+    };
+    for (options, name) in [(layers, "feature layers"), (rendered, "rendered images")] {
+        let mut client = Client {
+            game: Game::new(UnitData::Liberty, 1, None),
+            asked: 0,
+        };
+        client.ask(request::Kind::CreateGame(create("3m", None)));
+        let join = |options| {
+            request::Kind::JoinGame(JoinGame {
+                race: None,
+                options,
+            })
+        };
+        let answer = client.ask(join(Some(options)));
+        let response::Kind::JoinGame(refused) = answer else {
+            panic!("{answer:?}");
+        };
+        assert_eq!((refused.player_id, refused.error), (None, Some(7)));
+        let details = refused.error_details.unwrap();
+        assert!(details.starts_with(name), "{details}");
+        assert_eq!(client.game.status(), Status::InitGame);
+        let raw = InterfaceOptions {
+            raw: Some(true),
+            ..InterfaceOptions::default()
+        };
+        client.ask(join(Some(raw)));
+        assert_eq!(client.game.status(), Status::InGame);
+    }
 }
 
 #[test]
