@@ -14,7 +14,7 @@ mkdir -p "$results"
 keep() {
     local name="$1"
     shift
-    cargo test --release --quiet -p mackrl "$@" -- --nocapture | grep -E ': [0-9]+ cases|kills|failing operations' | tee "$results/$name.txt"
+    cargo test --release --quiet "$@" -- --nocapture | grep -E ': [0-9]+ cases|kills|failing operations' | tee "$results/$name.txt"
 }
 
 if [ $# -eq 0 ]; then
@@ -22,12 +22,12 @@ if [ $# -eq 0 ]; then
 fi
 for step in "$@"; do
     case "$step" in
-        disks) keep disks --bin mackrl faults ;;
-        kills) MACKRL_KILLS="${KILLS:-5000}" keep kills --test crash ;;
-        fuzz) MACKRL_FUZZ_SECONDS="${FUZZ_SECONDS:-7200}" MACKRL_FUZZ_SEED="${FUZZ_SEED:-2}" keep fuzz --test fuzz ;;
+        disks) keep disks -p mackrl-run --lib faults ;;
+        kills) MACKRL_KILLS="${KILLS:-5000}" keep kills -p mackrl --features slow-tests --test crash ;;
+        fuzz) MACKRL_FUZZ_SECONDS="${FUZZ_SECONDS:-7200}" MACKRL_FUZZ_SEED="${FUZZ_SEED:-2}" keep fuzz -p mackrl --features slow-tests --test fuzz ;;
         soak)
             MACKRL_SOAK_SECONDS="${SOAK_SECONDS:-3600}" MACKRL_SOAK_OUT="$results/soak" \
-                cargo test --release --quiet -p mackrl --test soak
+                cargo test --release --quiet -p mackrl --features slow-tests --test soak
             ;;
         *)
             printf 'error: no step is called %s, expected disks, kills, fuzz or soak\n' "$step" >&2

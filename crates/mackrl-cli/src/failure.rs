@@ -9,7 +9,7 @@ use std::{
 
 use mackrl::nn::UnknownInstructionSet;
 use mackrl_env::StepError;
-use mackrl_run::{RunError, config::ConfigError};
+use mackrl_run::{RunError, config::ConfigError, provenance::Versions};
 use thiserror::Error;
 
 /// What can go wrong in this program beyond what its libraries say.
@@ -27,9 +27,11 @@ pub(crate) enum Failure {
         /// The first difference, in words.
         first: String,
     },
-    /// A result of other code, among which results of this program were to stand.
-    #[error("{message}")]
-    OtherCode { message: String },
+    /// Results that were to stand together, and were computed by different versions.
+    #[error(
+        "some runs were computed by {one} and others by {other}, or are still to be made by it"
+    )]
+    OtherVersions { one: Versions, other: Versions },
     /// StarCraft II is not as it has to be.
     #[cfg_attr(
         not(all(feature = "sc2", target_os = "linux")),
@@ -147,9 +149,9 @@ fn of_failure(failure: &Failure) -> Verdict {
         Failure::Usage { .. } => (Exit::Usage, None),
         Failure::BadData { .. } => (Exit::Data, None),
         Failure::Different { .. } | Failure::CertificateFailed { .. } => (Exit::Differs, None),
-        Failure::OtherCode { .. } => (
+        Failure::OtherVersions { .. } => (
             Exit::Usage,
-            Some("take such results as they are with --any-code, or choose another folder with --out".to_owned()),
+            Some("take them together as they are with --any-code, or choose another folder with --out".to_owned()),
         ),
         Failure::NotReady { .. } => (Exit::InputOutput, None),
         Failure::ReplayDiffers { .. } => (

@@ -24,7 +24,7 @@ pub(crate) fn print_json(value: &impl Serialize) -> anyhow::Result<()> {
     print(&(json + "\n"))
 }
 
-/// Writes a file that was asked for by name.
+/// Writes a file that was asked for by name, which may be a pipe or a device.
 pub(crate) fn write_file(file: &Path, content: &[u8]) -> anyhow::Result<()> {
     std::fs::write(file, content).with_context(|| format!("cannot write {}", file.display()))
 }

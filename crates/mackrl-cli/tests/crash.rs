@@ -1,6 +1,6 @@
 //! Killing a run at any instant, and a disk that takes no more, cost nothing that was written.
 //!
-//! `MACKRL_KILLS=5000 cargo test --release -p mackrl --test crash -- --nocapture` kills more often.
+//! `MACKRL_KILLS=5000 cargo test --release -p mackrl --features slow-tests --test crash -- --nocapture` kills more often.
 #![cfg(unix)]
 
 mod support;

@@ -4,6 +4,7 @@ mod support;
 
 use std::{fs, path::Path};
 
+use mackrl_run::provenance::LEARNING_VERSION;
 use serde_json::Value;
 use support::{checkpoints, exits, mackrl, train_on};
 
@@ -96,14 +97,16 @@ fn another_version_and_changed_records_are_told_apart() {
     let parent = tempfile::tempdir().expect("a folder for runs");
     let one = run(parent.path(), "one", 1, &[]);
     let other = run(parent.path(), "other", 1, &[]);
-    edit(&other, "run.json", "\"code\": \"", "\"code\": \"9.");
+    let own = format!("\"learning\": {LEARNING_VERSION}");
+    edit(&other, "run.json", &own, "\"learning\": 97");
     let found = diff(&one, &other, 1);
-    assert_eq!(found["code"]["name"], "code");
+    assert_eq!(found["versions"]["name"], "versions");
     assert_eq!(found["metrics"], Value::Null);
     edit(&other, "run.json", "\"finished\"", "\"interrupted\"");
     let stderr = exits(mackrl(&["resume", &other]), 0);
     assert!(
-        stderr.contains("warning: the run was made by code 9."),
+        stderr.contains("warning: the run was made by simulator")
+            && stderr.contains("learning 97 and"),
         "{stderr}"
     );
     let record = fs::read_to_string(Path::new(&other).join("run.json")).expect("a record");

@@ -3,7 +3,7 @@
 //! The hour, with its samples and its verdict kept in a folder:
 //!
 //! ```sh
-//! MACKRL_SOAK_SECONDS=3600 MACKRL_SOAK_OUT=results/robustness/soak cargo test --release -p mackrl --test soak
+//! MACKRL_SOAK_SECONDS=3600 MACKRL_SOAK_OUT=results/robustness/soak cargo test --release -p mackrl --features slow-tests --test soak
 //! ```
 //!
 //! Time for a step is time of the processor, because a machine that does other things as well slows a run without its fault.

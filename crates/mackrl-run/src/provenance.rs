@@ -9,15 +9,35 @@
 //! - in full in `provenance` of what `evaluate --json` and `certify --json` print and of every file of `reproduce`, which has a
 //!   list where several experiments meet in a file.
 //!
+//! What a run computes is named by two [`Versions`], of the simulator and of learning, which are raised when it changes: a golden run
+//! (`crates/mackrl-run/tests/golden_runs.rs`) holds them. The hash of the sources stands beside them as information: it changes with
+//! every comment, so results that differ in it alone are taken together, and it refuses nothing.
+//!
 //! Nothing in it depends on the clock, the machine, the folder or the number of threads: equal work has an equal provenance.
 
-use crate::config::{Config, EnvironmentConfig};
+use std::fmt;
+
+use mackrl_skirmish::SIMULATOR_VERSION;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
+
+use crate::config::{Config, EnvironmentConfig};
 
 /// The version of the code that results come from: the crates' version and the first digits of the hash of the libraries'
 /// sources and data (see `build.rs`).
 pub const CODE: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("MACKRL_SOURCE"));
+
+/// Version of everything between the worlds and the weights: raised when a run with the same configuration, in the same version of
+/// the simulator, no longer gives the same weights.
+///
+/// 1: mackrl 0.1.0, which drew and learnt with the exponential function of the platform. 2: our own, the same on every machine.
+pub const LEARNING_VERSION: u32 = 2;
+
+/// The versions of runs that do not say, which mackrl 0.1.0 made.
+const FIRST: Versions = Versions {
+    simulator: 2,
+    learning: 1,
+};
 
 /// [`Provenance::code`] of results that do not say.
 const UNKNOWN: &str = "unknown";
@@ -25,13 +45,55 @@ const UNKNOWN: &str = "unknown";
 /// Hexadecimal digits of an id.
 const ID_DIGITS: usize = 16;
 
+/// What a result was computed by: equal versions compute the same from the same configuration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Versions {
+    /// [`SIMULATOR_VERSION`].
+    pub simulator: u32,
+    /// [`LEARNING_VERSION`].
+    pub learning: u32,
+}
+
+impl Versions {
+    /// Those of this program.
+    pub const OWN: Self = Self {
+        simulator: SIMULATOR_VERSION,
+        learning: LEARNING_VERSION,
+    };
+
+    const fn first() -> Self {
+        FIRST
+    }
+
+    fn are_first(&self) -> bool {
+        *self == FIRST
+    }
+}
+
+/// "simulator 2, learning 2"
+impl fmt::Display for Versions {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            formatter,
+            "simulator {}, learning {}",
+            self.simulator, self.learning
+        )
+    }
+}
+
 /// Where a result comes from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Provenance {
     /// Names this provenance: the first 16 digits of the SHA-256 of all that follows.
     pub id: String,
-    /// [`CODE`] of the program that made the result.
+    /// [`CODE`] of the program that made the result, for information.
     pub code: String,
+    /// What it was computed by; results of mackrl 0.1.0 do not say.
+    #[serde(
+        default = "Versions::first",
+        skip_serializing_if = "Versions::are_first"
+    )]
+    pub versions: Versions,
     /// The map's name.
     pub map: String,
     /// SHA-256 of the map's file and the unit statistics it is played with: `cat maps/3m.toml units/liberty.toml | sha256sum`.
@@ -88,6 +150,7 @@ impl Provenance {
     pub fn of_unknown_code(config: &Config) -> Self {
         let provenance = Self {
             code: UNKNOWN.to_owned(),
+            versions: FIRST,
             ..Self::of_run(config)
         };
         provenance.identified()
@@ -97,7 +160,8 @@ impl Provenance {
     pub fn merged<'a>(of: impl IntoIterator<Item = &'a Self>) -> Vec<Self> {
         let mut experiments: Vec<Self> = Vec::new();
         for one in of {
-            let same = |other: &&mut Self| one.differences(other).is_empty();
+            let same =
+                |other: &&mut Self| one.code == other.code && one.differences(other).is_empty();
             match experiments.iter_mut().find(same) {
                 Some(experiment) => experiment.seeds.extend(&one.seeds),
                 None => experiments.push(one.clone()),
@@ -125,6 +189,7 @@ impl Provenance {
         let provenance = Self {
             id: String::new(),
             code: CODE.to_owned(),
+            versions: Versions::OWN,
             map: env.map().to_owned(),
             map_sha256: sha256(env.data().as_bytes()),
             config_sha256: sha256(settings.as_bytes()),
@@ -138,7 +203,7 @@ impl Provenance {
     /// What makes this another experiment than `other`: the names of the fields that differ, seeds and weights aside.
     pub fn differences(&self, other: &Self) -> Vec<&'static str> {
         let fields = [
-            ("code", self.code != other.code),
+            ("versions", self.versions != other.versions),
             (
                 "map",
                 (&self.map, &self.map_sha256) != (&other.map, &other.map_sha256),
@@ -213,11 +278,16 @@ mod tests {
         assert_eq!(one.differences(&map), ["map", "config"]);
         let tests = provenance(|config| config.test.episodes = 5);
         assert_eq!(one.differences(&tests), ["config", "evaluation"]);
-        let code = Provenance {
+        let comment = Provenance {
             code: "0.0.1+x".to_owned(),
             ..one.clone()
         };
-        assert_eq!(one.differences(&code), ["code"]);
+        assert_eq!(one.differences(&comment), [""; 0]);
+        let learning = Provenance {
+            versions: FIRST,
+            ..one.clone()
+        };
+        assert_eq!(one.differences(&learning), ["versions"]);
     }
 
     #[test]
@@ -230,7 +300,7 @@ mod tests {
         assert_eq!((&merged[0].seeds, &merged[1]), (&vec![1, 2], &gamma));
         assert_ne!(merged[0].id, one.id);
         let unknown = Provenance::of_unknown_code(&Config::default());
-        assert_eq!(unknown.differences(&one), ["code"]);
+        assert_eq!(unknown.differences(&one), ["versions"]);
     }
 
     /// `cat maps/3m.toml units/liberty.toml | sha256sum`, and the same for the matrix game's payoffs.
@@ -249,6 +319,18 @@ mod tests {
         let payoffs = "1 0 0 0.4 0\n0 0.2 0.4 0.8 0.4\n0 0 0 0.4 0\n0 0 0 0.2 0\n0 0 0 0 0\n\
                        0 0 0.2 0 1\n0 0 0.4 0 0\n0.2 0.4 0.8 0.4 0.2\n0 0 0.4 0 0\n0 0 0.2 0 0\n";
         assert_eq!(game.map_sha256, sha256(payoffs.as_bytes()));
+    }
+
+    /// A provenance as mackrl 0.1.0 wrote it, from `results/figure6`.
+    #[test]
+    fn results_of_the_first_release_are_read_and_written_as_they_were() {
+        let text = r#"{"id":"a42b9325271a7b11","code":"0.1.0+2beb505bad00","map":"2s3z","map_sha256":"5f8621d56ee748976822d75fae788ee07b1994a11922180d9dcb74d0324c414b","config_sha256":"817bd60e498ddef658463627e6ab33a92f1821ae9a69ee8ef4de3f707cc68b90","seeds":[1],"evaluation":{"actions":"greedy","episodes":24}}"#;
+        let old: Provenance = serde_json::from_str(text).unwrap();
+        assert_eq!(old.versions, FIRST);
+        assert_eq!(serde_json::to_string(&old).unwrap(), text);
+        assert_eq!(old.clone().identified(), old);
+        let own = serde_json::to_value(provenance(|_| ())).unwrap();
+        assert_eq!(own["versions"]["learning"], LEARNING_VERSION);
     }
 
     #[test]

@@ -13,7 +13,7 @@ use serde::Serialize;
 use crate::{
     config::Config,
     error::{Result, RunError},
-    provenance::{CODE, Provenance},
+    provenance::{Provenance, Versions},
     run_folder::{Resumption, RunFolder, Status},
     stop_request::StopRequest,
     training::{Checkpoint, MetricRow, Trainer, assembly::World},
@@ -102,14 +102,15 @@ pub fn resume(
         config,
         checkpoint,
         damaged,
-        earlier_code,
+        earlier,
     } = RunFolder::resume(path, threads)?;
     for damage in damaged {
         observer.warn(&format!("{damage}; an earlier one is used"));
     }
-    if let Some(code) = earlier_code {
+    if let Some(earlier) = earlier {
         observer.warn(&format!(
-            "the run was made by code {code} and goes on with {CODE}: it may not be what either of them makes alone"
+            "the run was made by {earlier} and goes on with {}: it may not be what either of them makes alone",
+            Versions::OWN
         ));
     }
     let world = world(&config)?;

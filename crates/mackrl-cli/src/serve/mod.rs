@@ -31,6 +31,8 @@ use crate::{
 const PAGE: &str = include_str!("page.html");
 /// Longest that a browser may take to ask or to listen.
 const PATIENCE: Duration = Duration::from_secs(10);
+/// Between a connection that could not be accepted and the next attempt.
+const RECOVERY: Duration = Duration::from_millis(20);
 /// Most connections at once.
 const CONNECTIONS_MOST: usize = 32;
 
@@ -49,20 +51,40 @@ pub(crate) fn serve(folders: &[PathBuf], port: u16) -> anyhow::Result<()> {
     let served = Arc::new(Served::new(folders));
     let connections = Arc::new(AtomicUsize::new(0));
     for stream in listener.incoming() {
-        // Whoever went away before being heard needs no answer.
-        let Ok(stream) = stream else { continue };
-        if connections.load(Ordering::Relaxed) >= CONNECTIONS_MOST {
+        let Ok(stream) = stream else {
+            // A connection that is gone already costs nothing; without free descriptors, asking again at once would spin.
+            std::thread::sleep(RECOVERY);
             continue;
-        }
-        let (served, connections) = (Arc::clone(&served), Arc::clone(&connections));
-        connections.fetch_add(1, Ordering::Relaxed);
+        };
+        let Some(slot) = Slot::take(&connections) else {
+            continue;
+        };
+        let served = Arc::clone(&served);
         std::thread::spawn(move || {
-            // A browser that hangs up loses its answer, and nobody else does.
+            let _slot = slot;
+            // A browser that hangs up loses its own answer alone.
             let _ = answer(&stream, &served, port);
-            connections.fetch_sub(1, Ordering::Relaxed);
         });
     }
     Ok(())
+}
+
+/// One of the connections that may be open at once; given back when it is dropped, also by a panic.
+struct Slot(Arc<AtomicUsize>);
+
+impl Slot {
+    /// Takes one, if there is one.
+    fn take(connections: &Arc<AtomicUsize>) -> Option<Self> {
+        let more = |open| (open < CONNECTIONS_MOST).then_some(open + 1);
+        let taken = connections.fetch_update(Ordering::Relaxed, Ordering::Relaxed, more);
+        taken.is_ok().then(|| Self(Arc::clone(connections)))
+    }
+}
+
+impl Drop for Slot {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
+    }
 }
 
 fn answer(stream: &TcpStream, served: &Served, port: u16) -> std::io::Result<()> {

@@ -83,3 +83,16 @@ fn a_request_is_bounded_and_for_this_machine() {
     assert_eq!(status("GET / HTTP/1.1\r\n"), 400);
     assert_eq!(status(&"x".repeat(100_000)), 431);
 }
+
+#[test]
+fn a_connection_that_panics_gives_its_slot_back() {
+    let connections = Arc::new(AtomicUsize::new(CONNECTIONS_MOST - 1));
+    let slot = Slot::take(&connections).unwrap();
+    assert!(Slot::take(&connections).is_none(), "all are taken");
+    let handler = std::thread::spawn(move || {
+        let _slot = slot;
+        panic!("on purpose");
+    });
+    assert!(handler.join().is_err());
+    assert!(Slot::take(&connections).is_some());
+}

@@ -4,9 +4,9 @@
 //! follow from a seed, so a failure can be repeated; its input is kept, too.
 //!
 //! ```sh
-//! cargo test -p mackrl --test fuzz                                                      # half a minute, seed 1
-//! MACKRL_FUZZ_SECONDS=7200 MACKRL_FUZZ_SEED=2 cargo test --release -p mackrl --test fuzz -- --nocapture
-//! MACKRL_FUZZ_TARGET=scenario MACKRL_FUZZ_INPUT=/path/to/kept/input cargo test -p mackrl --test fuzz
+//! cargo test -p mackrl --features slow-tests --test fuzz                                                      # half a minute, seed 1
+//! MACKRL_FUZZ_SECONDS=7200 MACKRL_FUZZ_SEED=2 cargo test --release -p mackrl --features slow-tests --test fuzz -- --nocapture
+//! MACKRL_FUZZ_TARGET=scenario MACKRL_FUZZ_INPUT=/path/to/kept/input cargo test -p mackrl --features slow-tests --test fuzz
 //! ```
 //!
 //! The harness is our own because the usual ones need a nightly compiler (`cargo fuzz`) or, on a stable one, do without the
@@ -126,7 +126,7 @@ fn check(target: &mut dyn Target, input: &[u8], case: &str) {
     fs::write(&kept, input).expect("an input can be kept");
     if let Err(problem) = attempt(target, input) {
         panic!(
-            "{problem}\nrepeat with MACKRL_FUZZ_TARGET={} MACKRL_FUZZ_INPUT={} cargo test -p mackrl --test fuzz",
+            "{problem}\nrepeat with MACKRL_FUZZ_TARGET={} MACKRL_FUZZ_INPUT={} cargo test -p mackrl --features slow-tests --test fuzz",
             target.name(),
             kept.display()
         );

@@ -181,7 +181,7 @@ fn check_alike(runs: &[RecordedRun], selection: &Selection) -> Result<()> {
         // Maps differ, but one program plays all of them.
         let first = &runs[0];
         for (what, values) in [
-            ("the version of the program", [first, run].map(code)),
+            ("the version of the program", [first, run].map(versions)),
             ("map data", [reference, run].map(map_data)),
         ] {
             if values[0] != values[1] {
@@ -208,9 +208,11 @@ fn check_alike(runs: &[RecordedRun], selection: &Selection) -> Result<()> {
 }
 
 /// The versions of the program that made a run.
-fn code(run: &RecordedRun) -> String {
-    let codes: Vec<&str> = run.provenance.iter().map(|one| &*one.code).collect();
-    codes.join(" then ")
+fn versions(run: &RecordedRun) -> String {
+    let versions = run.provenance.iter().map(|one| one.versions.to_string());
+    let mut versions: Vec<String> = versions.collect();
+    versions.dedup();
+    versions.join(" then ")
 }
 
 /// Names the data of the map and its units.
@@ -322,10 +324,11 @@ mod tests {
     #[test]
     fn other_versions_and_repeated_seeds_are_refused() {
         let mut newer = run(&["run.seed=2"]);
-        newer.provenance[0].code = "2".to_owned();
+        newer.provenance[0].versions.learning = 97;
         let refusal = names(vec![run(&[]), newer], &Selection::default()).unwrap_err();
         assert!(
-            refusal.contains("differ in the version of the program") && refusal.ends_with("and 2"),
+            refusal.contains("differ in the version of the program")
+                && refusal.ends_with("learning 97"),
             "{refusal}"
         );
         let refusal =

@@ -38,7 +38,7 @@ use crate::{
     bounded,
     config::Config,
     error::{Context, Result, RunError},
-    provenance::{CODE, Provenance},
+    provenance::{Provenance, Versions},
     training::{Checkpoint, assembly::tensors_bytes_max},
 };
 use event_file::EventFile;
@@ -112,8 +112,8 @@ pub struct Resumption {
     pub checkpoint: Option<Checkpoint>,
     /// Later checkpoints that could not be used, and why.
     pub damaged: Vec<String>,
-    /// The code that made the run so far, if it is not that of this program.
-    pub earlier_code: Option<String>,
+    /// The versions that made the run so far, if they are not those of this program.
+    pub earlier: Option<Versions>,
 }
 
 impl RunFolder {
@@ -196,12 +196,12 @@ impl RunFolder {
         let config = run::read_config(path)?;
         let lock = lock(path)?;
         let record = read_record(path);
-        let earlier_code = record
+        let earlier = record
             .map(|record| match record.provenance.last() {
-                Some(provenance) => provenance.code.clone(),
-                None => "of an early version".to_owned(),
+                Some(provenance) => provenance.versions,
+                None => Provenance::of_unknown_code(&config).versions,
             })
-            .filter(|code| code != CODE);
+            .filter(|versions| *versions != Versions::OWN);
         let (latest, damaged) = checkpoints::latest(path, tensors_bytes_max(&config)?)?;
         checkpoints::tidy(&RealDisk, path, latest.as_ref().map(|stored| stored.number))?;
         let (metrics, checkpoint) = latest
@@ -213,7 +213,7 @@ impl RunFolder {
             config,
             checkpoint,
             damaged,
-            earlier_code,
+            earlier,
         })
     }
 

@@ -19,8 +19,8 @@ use crate::args::DiffArgs;
 #[derive(Debug, Serialize)]
 pub(super) struct Runs {
     equal: bool,
-    /// The versions of the code, if they differ.
-    code: Option<Differing>,
+    /// The versions of simulator and learning, if they differ.
+    versions: Option<Differing>,
     /// The hashes of the map data, if they differ.
     map_data: Option<Differing>,
     /// All settings that differ.
@@ -47,8 +47,8 @@ pub(super) fn compare(args: &DiffArgs) -> anyhow::Result<Runs> {
     };
     let mut runs = Runs {
         equal: false,
-        code: of_provenance("code", &a, &b, |provenance| &provenance.code),
-        map_data: of_provenance("map data", &a, &b, |provenance| &provenance.map_sha256),
+        versions: of_provenance("versions", &a, &b, |one| one.versions.to_string()),
+        map_data: of_provenance("map data", &a, &b, |one| one.map_sha256.clone()),
         configuration: settings(&a.config, &b.config),
         metrics,
         weights_differ,
@@ -89,13 +89,9 @@ fn of_provenance(
     name: &str,
     a: &Recorded,
     b: &Recorded,
-    of: impl Fn(&Provenance) -> &String,
+    of: impl Fn(&Provenance) -> String,
 ) -> Option<Differing> {
-    let value = |run: &Recorded| {
-        run.provenance
-            .as_ref()
-            .map(|provenance| of(provenance).clone())
-    };
+    let value = |run: &Recorded| run.provenance.as_ref().map(&of);
     let (a, b) = (value(a), value(b));
     (a != b).then(|| Differing::new(name, a, b))
 }
@@ -125,7 +121,7 @@ impl Comparison for Runs {
         let configuration = || self.configuration.first().map(Differing::words);
         let metrics = || self.metrics.as_ref().map(RowDifference::words);
         let weights = || self.weights_differ.then(|| "final weights".to_owned());
-        of(&self.code)
+        of(&self.versions)
             .or_else(|| of(&self.map_data))
             .or_else(configuration)
             .or_else(metrics)
@@ -147,7 +143,7 @@ impl Comparison for Runs {
             same()
         };
         let mut lines = vec![
-            ("code", of(&self.code)),
+            ("versions", of(&self.versions)),
             ("map data", of(&self.map_data)),
             ("configuration", settings),
             ("metrics", metrics.map_or_else(same, RowDifference::words)),

@@ -10,7 +10,9 @@ mod curve;
 mod options;
 mod run;
 
-use mackrl_run::{recorded::TrainingRun, sweep::Entry};
+use std::collections::BTreeSet;
+
+use mackrl_run::{provenance::Versions, recorded::TrainingRun, sweep::Entry};
 
 use crate::{commands::resume::make_all, failure::Failure, signals};
 pub(crate) use curve::{Curve, Difference};
@@ -30,6 +32,9 @@ pub(crate) fn train_all(
         .map(|job| job.load(options))
         .collect::<anyhow::Result<_>>()?;
     let missing: Vec<usize> = (0..jobs.len()).filter(|&job| runs[job].is_none()).collect();
+    if !options.any_code {
+        check_versions(&runs)?;
+    }
     let entries: Vec<Entry> = (missing.iter())
         .map(|&job| jobs[job].entry(options))
         .collect::<anyhow::Result<_>>()?;
@@ -46,4 +51,45 @@ pub(crate) fn train_all(
         runs[job] = Some(jobs[job].keep(entry, options)?);
     }
     Ok(runs.into_iter().flatten().collect())
+}
+
+/// Refuses runs of which some were computed by other versions than the rest, or than this program if runs are still to be made.
+///
+/// # Errors
+/// [`Failure::OtherVersions`], with both.
+fn check_versions(runs: &[Option<TrainingRun>]) -> Result<(), Failure> {
+    let versions = |run: &Option<TrainingRun>| {
+        run.as_ref()
+            .map_or(Versions::OWN, |run| run.provenance().versions)
+    };
+    let versions: BTreeSet<Versions> = runs.iter().map(versions).collect();
+    let mut versions = versions.into_iter();
+    match (versions.next(), versions.next()) {
+        (Some(one), Some(other)) => Err(Failure::OtherVersions { one, other }),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mackrl_run::config::Config;
+
+    use super::*;
+
+    #[test]
+    fn runs_of_other_versions_are_drawn_alone_and_not_mixed() {
+        let own = TrainingRun::new(&Config::default(), vec![0.5], Vec::new());
+        let mut old = serde_json::to_value(&own).unwrap();
+        old["provenance"]["versions"]["learning"] = 1.into();
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("old.json");
+        std::fs::write(&file, old.to_string()).unwrap();
+        let old = TrainingRun::load(&file).unwrap();
+        assert!(check_versions(&[Some(old.clone()), Some(old.clone())]).is_ok());
+        assert!(check_versions(&[Some(own.clone()), None]).is_ok());
+        for other in [Some(own), None] {
+            let error = check_versions(&[Some(old.clone()), other]).unwrap_err();
+            assert!(error.to_string().contains("learning 1 and "), "{error}");
+        }
+    }
 }

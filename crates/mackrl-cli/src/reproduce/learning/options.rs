@@ -49,7 +49,7 @@ pub(crate) struct LearningOptions {
     #[arg(long)]
     pub(crate) quick: bool,
 
-    /// Use finished runs of other versions of this program too; the report names them.
+    /// Take runs together that were computed by different versions of simulator or learning; the report names them.
     #[arg(long)]
     pub(crate) any_code: bool,
 

@@ -5,14 +5,13 @@ use std::{fs, path::Path};
 use anyhow::Context as _;
 use mackrl_run::{
     config::{Config, ConfigBuilder},
-    provenance::CODE,
     recorded::{KEPT, TRAINING, TrainingRun},
     sweep::Entry,
 };
 use serde::{Deserialize, Serialize};
 
 use super::LearningOptions;
-use crate::{failure::Failure, reproduce::write};
+use crate::reproduce::write;
 
 /// Who learns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -74,19 +73,7 @@ impl Job {
     pub(super) fn load(&self, options: &LearningOptions) -> anyhow::Result<Option<TrainingRun>> {
         let config = self.config(options)?;
         let path = options.out.join(KEPT).join(self.file_name());
-        let Some(run) = load(&path, &config) else {
-            return Ok(None);
-        };
-        let provenance = run.provenance();
-        if provenance.code != CODE && !options.any_code {
-            let message = format!(
-                "{} was made by code {}, expected {CODE}",
-                path.display(),
-                provenance.code
-            );
-            return Err(Failure::OtherCode { message }.into());
-        }
-        Ok(Some(run))
+        Ok(load(&path, &config))
     }
 
     /// The run as a run of a sweep.

@@ -1,0 +1,69 @@
+//! What a run computes has a version: the same configuration gives the same weights until that version is raised.
+
+use std::{fs, path::Path};
+
+use mackrl_run::{
+    config::{Config, ConfigBuilder},
+    provenance::{LEARNING_VERSION, sha256},
+    training::Trainer,
+};
+use mackrl_skirmish::SIMULATOR_VERSION;
+use serde_json::{Value, json};
+
+const RUNS: [(&str, &str); 4] = [
+    ("3m", "mackrl"),
+    ("3m", "central-v"),
+    ("2s3z", "mackrl"),
+    ("2s3z", "central-v"),
+];
+
+fn config(map: &str, algorithm: &str) -> Config {
+    let settings = [
+        format!("env.map={map}"),
+        format!("policy.algorithm={algorithm}"),
+        "run.steps_env=3000".to_owned(),
+        "run.seed=1".to_owned(),
+    ];
+    let preset = ConfigBuilder::new().preset("paper-code");
+    let builder = settings
+        .iter()
+        .try_fold(preset.expect("a shipped preset"), |builder, setting| {
+            builder.set(setting)
+        });
+    let config = builder.and_then(|builder| builder.build());
+    config.expect("a configuration that can be trained")
+}
+
+fn weights_sha256(map: &str, algorithm: &str) -> String {
+    let mut trainer = Trainer::new(&config(map, algorithm), 2).expect("a run");
+    while !trainer.finished() {
+        trainer.update().expect("the run goes on");
+    }
+    sha256(&trainer.weights())
+}
+
+#[test]
+fn the_same_versions_train_the_same_weights() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/runs.json");
+    let golden = fs::read(&path).expect("the golden file");
+    let golden: Value = serde_json::from_slice(&golden).expect("the golden file is JSON");
+    let runs: Vec<Value> = RUNS
+        .iter()
+        .map(|(map, algorithm)| {
+            let weights = weights_sha256(map, algorithm);
+            json!({ "map": map, "algorithm": algorithm, "weights_sha256": weights })
+        })
+        .collect();
+    let found = json!({
+        "of": "mackrl train --preset paper-code --map MAP --algorithm ALGORITHM --steps 3000 --seed 1: sha256sum weights.safetensors",
+        "simulator": SIMULATOR_VERSION,
+        "learning": LEARNING_VERSION,
+        "runs": runs,
+    });
+    assert!(
+        found == golden,
+        "runs give other weights than before. If that is meant, raise SIMULATOR_VERSION (mackrl-skirmish) if battles differ or \
+         LEARNING_VERSION (mackrl-run) if learning does, tell it in CHANGELOG.md, and put this into {}:\n{found:#}",
+        path.display()
+    );
+}
