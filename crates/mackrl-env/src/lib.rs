@@ -9,8 +9,12 @@
 //! fills an [`ObservationMut`], one row of an [`Observations`] that holds a whole batch of environments, and allocates
 //! nothing. Randomness is a pure function of an [`EpisodeKey`], so an episode can be repeated from its key alone.
 //!
+//! A program that plays in worlds chooses a [`WorldKind`] by name, configures it by a table, and gets a [`World`], which is
+//! built once and makes as many environments as are wanted. [`contract::check_environment`] tells whether a world keeps its
+//! promises; `docs/environments.md` leads through one of your own.
+//!
 //! Axes, used in the names of buffers: `B` environment, `N` agent, `M` entity, `A` action, `F` entity feature,
-//! `O` observation, `G` state.
+//! `O` observation, `G` state, `S` statistic.
 
 // Macros name this crate by its name, here too.
 extern crate self as mackrl_env;
@@ -31,6 +35,8 @@ pub mod sanity;
 pub mod settings;
 mod world;
 
+use std::sync::Arc;
+
 pub use entity_set::EntitySet;
 pub use environment::{
     Environment, EnvironmentSpec, EpisodeEnd, IllegalAction, Interruption, InvalidSpec,
@@ -40,3 +46,15 @@ pub use ids::{Action, AgentId, EntityId};
 pub use observations::{KnownEntities, LocalView, ObservationMut, Observations};
 pub use random::{Draw, EpisodeKey, Stream};
 pub use world::{Counter, DeclaredKind, Prototype, World, WorldError, WorldKind};
+
+/// The kinds of worlds in this crate: the matrix game, and those of [`sanity`].
+#[must_use]
+pub fn kinds() -> Vec<Arc<dyn WorldKind>> {
+    let mut kinds: Vec<Arc<dyn WorldKind>> = vec![Arc::new(matrix_game::MatrixGameKind)];
+    kinds.extend(sanity::kinds());
+    kinds
+}
+
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/environments.md")]
+struct EnvironmentsPage;

@@ -1,4 +1,5 @@
-//! Time of a step with random available actions, observations, state and availability included.
+//! Time of a step with random available actions, observations, state and availability included; time of building a world, and
+//! of making an environment of one that is built.
 //!
 //! Episodes are restarted as they end, so the time of a reset is spread over the steps of its episode, as in training.
 
@@ -6,7 +7,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use mackrl_env::random_play::RandomPlay;
-use mackrl_skirmish::SkirmishSettings;
+use mackrl_skirmish::{PlaceSettings, SkirmishSettings};
 
 const MAPS: &[&str] = &["3m", "2s3z", "27m_vs_30m"];
 
@@ -24,5 +25,23 @@ fn step(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, step);
+fn world(criterion: &mut Criterion) {
+    let settings = SkirmishSettings::default();
+    for name in MAPS {
+        let place = PlaceSettings {
+            map: (*name).to_owned(),
+            ..PlaceSettings::default()
+        };
+        let build = || place.world(&settings).expect("a map of this crate");
+        criterion.bench_function(&format!("world/build/{name}"), |bencher| {
+            bencher.iter(|| black_box(build()));
+        });
+        let built = build();
+        criterion.bench_function(&format!("world/make/{name}"), |bencher| {
+            bencher.iter(|| black_box(built.make()));
+        });
+    }
+}
+
+criterion_group!(benches, step, world);
 criterion_main!(benches);
