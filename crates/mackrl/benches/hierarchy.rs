@@ -4,12 +4,19 @@
 
 use std::hint::black_box;
 
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{
+    BenchmarkGroup, Criterion, criterion_group, criterion_main, measurement::WallTime,
+};
 use mackrl::{
+    algorithms::Algorithm,
     common_knowledge::common_knowledge,
+    experience::Experience,
     marginalisation::{MarginalGradient, log_likelihood_with_gradient},
-    partition::{Pairs, all_partitions},
-    policy::{Actor, Behaviour, PolicyShape, PolicyTable, Recording, Situation, Weights},
+    partition::{Pairs, PartitionSchedule},
+    policy::{
+        Actor, Behaviour, Declaration, Delegation, PolicyTable, Recording, Selection, Situation,
+        TEAM,
+    },
 };
 use mackrl_env::{Action, Environment, EpisodeKey, Observations, Stream};
 use mackrl_run::{
@@ -51,25 +58,37 @@ fn acting(criterion: &mut Criterion) {
 fn marginal(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("marginal with gradient");
     for (agents, actions) in [(3, 9), (5, 11), (8, 14)] {
-        let shape = PolicyShape { agents, actions };
-        let partitions = all_partitions(agents);
-        let even = |choices: usize, rows: usize| vec![-(choices as f32).ln(); choices * rows];
-        let log_p_selector_p = even(partitions.len(), 1);
-        let log_p_pair_kc = even(shape.columns(), shape.pairs());
-        let log_p_agent_na = even(actions, agents);
-        let tables = [&log_p_selector_p[..], &log_p_pair_kc, &log_p_agent_na];
-        let table = PolicyTable::new(shape, &partitions, tables[0], tables[1], tables[2])
-            .expect("the tables fit their shape");
-        let actions_n: Vec<Action> = (0..agents).map(Action::new).collect();
-        let mut gradient = MarginalGradient::new(shape, partitions.len());
-        let name = format!("{agents} agents, {} partitions", partitions.len());
-        group.bench_function(name, |bencher| {
-            bencher.iter(|| {
-                log_likelihood_with_gradient(&table, black_box(&actions_n), &mut gradient)
-            });
-        });
+        let (all, selection) = (PartitionSchedule::All, Selection::Learned);
+        let pairwise =
+            Declaration::pairwise([agents, actions], all, selection, Delegation::Learned, 1)
+                .expect("small teams");
+        let fours =
+            Declaration::fours([agents, actions], Delegation::Learned).expect("small teams");
+        measure(&mut group, "partitions", &pairwise);
+        measure(&mut group, "divisions into fours", &fours);
     }
     group.finish();
+}
+
+/// Measures the marginal of a team that chooses evenly.
+fn measure(group: &mut BenchmarkGroup<'_, WallTime>, what: &str, declaration: &Declaration) {
+    let (agents, actions) = (declaration.agents(), declaration.actions());
+    let rows: Vec<Vec<f32>> = (declaration.levels().iter())
+        .map(|level| {
+            let columns = level.columns(actions);
+            vec![-(columns as f32).ln(); columns * level.groups.len()]
+        })
+        .collect();
+    let levels: Vec<&[f32]> = rows.iter().map(Vec::as_slice).collect();
+    let in_force = &declaration.levels()[TEAM].divisions_gd[0];
+    let table =
+        PolicyTable::new(declaration, in_force, &levels).expect("the tables fit their declaration");
+    let actions_n: Vec<Action> = (0..agents).map(Action::new).collect();
+    let mut gradient = MarginalGradient::default();
+    let name = format!("{agents} agents, {} {what}", in_force.len());
+    group.bench_function(name, |bencher| {
+        bencher.iter(|| log_likelihood_with_gradient(&table, black_box(&actions_n), &mut gradient));
+    });
 }
 
 /// A few battles that have been going on for a while, and the untrained team that fights them.
@@ -78,8 +97,9 @@ struct Scene {
     environments: Vec<Box<dyn Environment>>,
     observations: Observations,
     keys: Vec<EpisodeKey>,
-    weights: Weights,
+    team: Box<dyn Algorithm>,
     actor: Box<dyn Actor>,
+    experience: Experience,
     actions_bn: Vec<Action>,
     playing: Vec<usize>,
 }
@@ -92,7 +112,7 @@ impl Scene {
         ];
         let config = Config::with(&settings).expect("a map of this program");
         let world = World::new(&config).expect("a world of this program");
-        let policy = assembly::policy(&config, &world).expect("a policy of this program");
+        let team = assembly::algorithm(&config, &world, 1).expect("a team of this program");
         let environments = world.environments(ENVIRONMENTS);
         let agents = world.spec().agents;
         let episodes = 0..ENVIRONMENTS as u64;
@@ -103,8 +123,9 @@ impl Scene {
             keys: episodes
                 .map(|episode| EpisodeKey::new(1, Stream::Other, episode))
                 .collect(),
-            weights: policy.weights(&policy.initialise(1)),
-            actor: policy.actor(ENVIRONMENTS),
+            actor: team.policy().actor(ENVIRONMENTS),
+            team,
+            experience: Experience::default(),
             actions_bn: vec![Action::default(); ENVIRONMENTS * agents],
             playing: (0..ENVIRONMENTS).collect(),
         };
@@ -113,7 +134,7 @@ impl Scene {
     }
 
     fn play(&mut self) {
-        self.actor.begin(Recording::Off);
+        self.actor.begin(Recording::Off, &mut self.experience);
         for (b, environment) in self.environments.iter_mut().enumerate() {
             environment.reset(self.keys[b], &mut self.observations.row_mut(b));
         }
@@ -137,8 +158,14 @@ impl Scene {
             observations: &self.observations,
             behaviour: Behaviour::sampled(0.1),
         };
+        let parameters = self.team.parameters();
         self.actor
-            .act(&self.weights, situation, &mut self.actions_bn)
+            .act(
+                parameters,
+                situation,
+                &mut self.experience,
+                &mut self.actions_bn,
+            )
             .expect("logits are finite");
     }
 }

@@ -3,10 +3,11 @@
 
 use mackrl::{
     Error,
-    hierarchy::{Path, Sampler},
     marginalisation::log_likelihood,
-    partition::all_partitions,
-    policy::{Mode, PolicyShape, PolicyTable},
+    partition::PartitionSchedule,
+    policy::{
+        Declaration, Delegation, DivisionBuffer, Mode, Path, PolicyTable, Sampler, Selection,
+    },
 };
 use mackrl_env::{Action, EpisodeKey, Stream};
 
@@ -15,11 +16,14 @@ const ACTIONS: usize = 2;
 const EPISODES: u64 = 200_000;
 
 fn main() -> Result<(), Error> {
-    let shape = PolicyShape {
-        agents: AGENTS,
-        actions: ACTIONS,
-    };
-    let partitions = all_partitions(AGENTS);
+    let sizes = [AGENTS, ACTIONS];
+    let (all, selection) = (PartitionSchedule::All, Selection::Learned);
+    let declaration = Declaration::pairwise(sizes, all, selection, Delegation::Learned, 1)?;
+    let (key, mut buffer) = (
+        EpisodeKey::new(1, Stream::Other, 0),
+        DivisionBuffer::default(),
+    );
+    let partitions = declaration.in_force(&key, 0, &mut buffer);
     let selector_p = log(&[0.5, 0.3, 0.2]);
     // For each pair: delegate, then the joint actions 00, 01, 10, 11. The last pair knows nothing in common.
     let pair_kc = log(&[
@@ -29,7 +33,11 @@ fn main() -> Result<(), Error> {
     ]
     .concat());
     let agent_na = log(&[0.9, 0.1, 0.4, 0.6, 0.5, 0.5]);
-    let table = PolicyTable::new(shape, &partitions, &selector_p, &pair_kc, &agent_na)?;
+    let table = PolicyTable::new(
+        &declaration,
+        partitions,
+        &[&selector_p, &pair_kc, &agent_na],
+    )?;
 
     let mut counts = [0_u32; 1 << AGENTS];
     let (mut action_n, mut path) = (vec![Action::default(); AGENTS], Path::default());
@@ -39,7 +47,7 @@ fn main() -> Result<(), Error> {
             step: 0,
             mode: Mode::Sampled,
         };
-        sampler.sample(&table, &mut action_n, &mut path);
+        sampler.walk(&table, None, &mut action_n, &mut path);
         counts[number(&action_n)] += 1;
     }
 

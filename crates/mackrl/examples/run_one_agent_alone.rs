@@ -1,7 +1,10 @@
 //! You will see each agent of a team, alone with its own views and the shared seed, choose what the central run chooses for it.
 #![expect(clippy::print_stdout, reason = "an example shows what it found")]
 
-use mackrl::policy::{Behaviour, Recording, Situation};
+use mackrl::{
+    experience::Experience,
+    policy::{Behaviour, Recording, Situation},
+};
 use mackrl_env::{Action, AgentId, EpisodeKey, Observations, Stream};
 use mackrl_run::{
     config::Config,
@@ -11,13 +14,13 @@ use mackrl_run::{
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let config = Config::with(&["env.map=3m"])?;
     let world = World::new(&config)?;
-    let policy = assembly::policy(&config, &world)?;
-    let weights = policy.weights(&policy.initialise(1));
+    let team = assembly::algorithm(&config, &world, 1)?;
+    let (policy, parameters) = (team.policy(), team.parameters());
     let behaviour = Behaviour::sampled(0.1);
     let key = EpisodeKey::new(1, Stream::Other, 0);
 
-    let mut central = policy.actor(1);
-    central.begin(Recording::Off);
+    let (mut central, mut experience) = (policy.actor(1), Experience::default());
+    central.begin(Recording::Off, &mut experience);
     let agents = (0..world.spec().agents).map(AgentId::new);
     let mut alone: Vec<_> = agents
         .map(|agent| (agent, policy.executor(agent)))
@@ -38,12 +41,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             observations: &observations,
             behaviour,
         };
-        central.act(&weights, situation, &mut action_n)?;
+        central.act(parameters, situation, &mut experience, &mut action_n)?;
         // An agent alone is given nothing but its own view: no state, no other agent, no message.
         let own: Vec<Action> = (alone.iter_mut())
             .map(|(agent, executor)| {
                 let view = observations.local_view(0, *agent);
-                executor.act(&weights, view, &key, step, behaviour)
+                executor.act(parameters, view, &key, step, behaviour)
             })
             .collect();
         println!("{step:4} {:>13} {:>14}", list(&action_n), list(&own));

@@ -1,17 +1,19 @@
 //! The certificate finds what it is there to find.
 
+mod support;
+
 use std::fmt::Debug;
 
-use mackrl::{NotFinite, Stopwatch, decentralised::*, nn::ParameterLayout, policy::*};
-use mackrl_env::*;
-use mackrl_run::{
-    config::Config,
-    training::assembly::{self, World},
+use mackrl::{
+    NotFinite, Stopwatch, decentralised::*, experience::Experience, hierarchy::Hierarchy,
+    nn::ParameterLayout, policy::*,
 };
+use mackrl_env::*;
+use support::team::{Team, world};
 
 /// A policy whose agent 0 peeks at the state now and then.
 #[derive(Debug)]
-struct Peeking(Box<dyn Decentralised>);
+struct Peeking(Hierarchy);
 
 struct PeekingActor(Box<dyn Actor>);
 
@@ -22,28 +24,26 @@ impl Policy for Peeking {
     fn initialise(&self, seed: u64) -> Vec<f32> {
         self.0.initialise(seed)
     }
-    fn weights(&self, parameters: &[f32]) -> Weights {
-        self.0.weights(parameters)
-    }
-    fn refresh(&self, parameters: &[f32], weights: &mut Weights) {
-        self.0.refresh(parameters, weights);
-    }
     fn actor(&self, environments: usize) -> Box<dyn Actor> {
         Box::new(PeekingActor(self.0.actor(environments)))
+    }
+    fn executor(&self, agent: AgentId) -> Box<dyn Executor> {
+        self.0.executor(agent)
     }
 }
 
 impl Actor for PeekingActor {
-    fn begin(&mut self, recording: Recording) {
-        self.0.begin(recording);
+    fn begin(&mut self, recording: Recording, experience: &mut Experience) {
+        self.0.begin(recording, experience);
     }
     fn act(
         &mut self,
-        weights: &Weights,
+        parameters: &Parameters,
         situation: Situation<'_>,
+        experience: &mut Experience,
         actions_bn: &mut [Action],
     ) -> Result<(), NotFinite> {
-        self.0.act(weights, situation, actions_bn)?;
+        self.0.act(parameters, situation, experience, actions_bn)?;
         let view = situation.observations.local_view(0, AgentId::new(0));
         let stop = Action::new(1);
         if situation.observations.state(0)[2]
@@ -55,65 +55,57 @@ impl Actor for PeekingActor {
         }
         Ok(())
     }
-    fn backward(&mut self, weights: &Weights, w: &[Vec<f32>], gradient: &mut [f32]) -> f64 {
-        self.0.backward(weights, w, gradient)
-    }
     fn report(&self, tally: &mut Tally) {
         self.0.report(tally);
     }
     fn stopwatch(&mut self) -> &mut Stopwatch {
         self.0.stopwatch()
     }
-    fn controller_inputs(&self, b: usize) -> Vec<ControllerInput> {
-        self.0.controller_inputs(b)
+    fn controller_inputs(&self, experience: &Experience, b: usize) -> Vec<ControllerInput> {
+        self.0.controller_inputs(experience, b)
     }
 }
 
-fn config(settings: &[&str]) -> Config {
-    Config::with(settings).unwrap()
+/// Certifies an untrained team; `central` is what the central run plays with.
+fn certify(team: &Team, episodes: usize, central: &dyn Policy) -> Certificate {
+    let parameters = Parameters::new(team.initialise());
+    certify_with(team, episodes, central, [&parameters, &parameters], 0.3)
 }
 
-/// Certifies an untrained team; `disguise` may change the policy of the central run.
-fn certify<P: Policy + ?Sized>(
-    config: &Config,
+/// The same, with parameters of the central run and of the agents on their own.
+fn certify_with(
+    team: &Team,
     episodes: usize,
-    disguise: impl FnOnce(Box<dyn Decentralised>) -> Box<P>,
-    central: impl Fn(&P) -> &dyn Policy,
+    central: &dyn Policy,
+    [parameters, own]: [&Parameters; 2],
+    exploration: f64,
 ) -> Certificate {
-    let world = World::new(config).unwrap();
-    let policy = assembly::policy(config, &world).unwrap();
-    let weights = policy.weights(&policy.initialise(config.run.seed));
-    let mut links: Vec<Box<dyn AgentLink + '_>> = (0..world.spec().agents)
-        .map(|agent| policy.executor(AgentId::new(agent)))
-        .map(|executor| Box::new(InProcessAgent::new(executor, &weights)) as Box<dyn AgentLink>)
+    let mut links: Vec<Box<dyn AgentLink + '_>> = (0..team.world.spec().agents)
+        .map(|agent| team.hierarchy.executor(AgentId::new(agent)))
+        .map(|executor| Box::new(InProcessAgent::new(executor, own)) as Box<dyn AgentLink>)
         .collect();
-    let disguised = disguise(assembly::policy(config, &world).unwrap());
-    let mut environment = world.environments(1).remove(0);
+    let mut environment = team.world.environments(1).remove(0);
     let mut subject = Subject {
-        policy: central(&disguised),
-        weights: &weights,
+        policy: central,
+        parameters,
         environment: &mut *environment,
         links: &mut links,
         seed: 5,
-        exploration: 0.3,
+        sampled: Behaviour::sampled(exploration),
     };
     subject.certify(episodes, |_, _| {}).unwrap()
 }
 
-fn certify_honest(settings: &[&str], episodes: usize) -> Certificate {
-    certify(
-        &config(settings),
-        episodes,
-        |policy| policy,
-        |policy| policy,
-    )
+fn certify_honest(team: &Team, episodes: usize) -> Certificate {
+    certify(team, episodes, &team.hierarchy)
 }
 
 #[test]
 fn agents_on_their_own_play_the_central_run_on_every_map() {
     for map in mackrl_skirmish::map_names() {
         let map = format!("env.map={map}");
-        let certificate = certify_honest(&[&map, "algorithm.partitions=round-robin"], 1);
+        let team = Team::mackrl(&[&map], r#"partitions = "round-robin""#);
+        let certificate = certify_honest(&team, 1);
         assert_eq!(certificate.first_mismatch, None, "{map}");
         assert!(
             certificate.actions_compared > 0 && certificate.inputs_compared > 0,
@@ -125,27 +117,39 @@ fn agents_on_their_own_play_the_central_run_on_every_map() {
 
 #[test]
 fn every_variant_of_the_hierarchy_is_decentralised() {
-    let variants: [&[&str]; 5] = [
-        &["env.map=2s3z"],
-        &["env.map=2s3z", "algorithm.common_knowledge=thin"],
-        &["env.map=2s3z", "algorithm.partitions=sampled:3"],
-        &["env.map=2s3z", "algorithm.selector=uniform"],
-        &["env.map=2s3z", "algorithm.name=central-v"],
+    let world = ["env.map=2s3z"];
+    let mackrl = [
+        "",
+        r#"common_knowledge = "thin""#,
+        r#"partitions = "sampled:3""#,
+        r#"selector = "uniform""#,
     ];
-    for variant in variants {
-        let certificate = certify_honest(variant, 3);
-        assert_eq!(certificate.first_mismatch, None, "{variant:?}");
+    let mut teams: Vec<Team> = mackrl.map(|settings| Team::mackrl(&world, settings)).into();
+    teams.push(Team::central_v(&world, ""));
+    for team in teams {
+        let certificate = certify_honest(&team, 3);
+        assert_eq!(certificate.first_mismatch, None, "{:?}", team.hierarchy);
+    }
+}
+
+#[test]
+fn a_hierarchy_with_fours_is_decentralised() {
+    for map in ["env.map=2s3z", "env.map=8m"] {
+        let certificate = certify_honest(&Team::fours(&[map], 11), 2);
+        assert_eq!(certificate.first_mismatch, None, "{map}");
+        assert_eq!(certificate.mismatches, 0, "{map}");
+        assert!(
+            certificate.actions_compared > 100 && certificate.inputs_compared > 1000,
+            "{map}: {certificate:?}"
+        );
+        assert!(certificate.altered_actions_compared > 100, "{map}");
     }
 }
 
 #[test]
 fn a_controller_that_reads_the_state_is_caught_by_both_checks() {
-    let certificate = certify(
-        &config(&[]),
-        5,
-        |policy| Box::new(Peeking(policy)),
-        |peeking| peeking,
-    );
+    let team = Team::mackrl(&["env.map=3m"], "");
+    let certificate = certify(&team, 5, &Peeking(team.hierarchy.clone()));
     let first = certificate.first_mismatch.expect("peeking is noticed");
     assert_eq!(
         (first.check, first.agent),
@@ -165,25 +169,10 @@ fn a_controller_that_reads_the_state_is_caught_by_both_checks() {
 
 #[test]
 fn agents_with_another_seed_are_caught_with_the_input_that_differs() {
-    let config = config(&["env.map=3m"]);
-    let world = World::new(&config).unwrap();
-    let policy = assembly::policy(&config, &world).unwrap();
-    let weights = policy.weights(&policy.initialise(1));
-    let others = policy.weights(&policy.initialise(2));
-    let mut links: Vec<Box<dyn AgentLink + '_>> = (0..3)
-        .map(|agent| policy.executor(AgentId::new(agent)))
-        .map(|executor| Box::new(InProcessAgent::new(executor, &others)) as Box<dyn AgentLink>)
-        .collect();
-    let mut environment = world.environments(1).remove(0);
-    let mut subject = Subject {
-        policy: &*policy,
-        weights: &weights,
-        environment: &mut *environment,
-        links: &mut links,
-        seed: 5,
-        exploration: 0.0,
-    };
-    let certificate = subject.certify(2, |_, _| {}).unwrap();
+    let team = Team::mackrl(&["env.map=3m"], "");
+    let [parameters, others] = [1, 2].map(|seed| Parameters::new(team.hierarchy.initialise(seed)));
+    let parameters = [&parameters, &others];
+    let certificate = certify_with(&team, 2, &team.hierarchy, parameters, 0.0);
     assert!(
         certificate.mismatches > 0,
         "other weights gave the same actions"
@@ -196,7 +185,7 @@ fn agents_with_another_seed_are_caught_with_the_input_that_differs() {
 
 #[test]
 fn a_view_by_value_holds_what_is_seen_and_nothing_else() {
-    let world = World::new(&config(&["env.map=2s3z"])).unwrap();
+    let world = world(&["env.map=2s3z"]);
     let mut environment = world.environments(1).remove(0);
     let mut observations = Observations::new(world.spec(), 1);
     let key = EpisodeKey::new(1, Stream::Other, 0);

@@ -3,15 +3,16 @@
 mod support;
 
 use mackrl::{
-    policy::{Behaviour, Recording},
-    rollout::{Episode, RolloutSettings},
+    algorithms::Algorithm,
+    experience::{Collector, Episode, PlaySettings},
+    policy::{Behaviour, Parameters, Recording},
 };
 use mackrl_env::EpisodeKey;
 use mackrl_run::{
     config::Config,
     training::{Evaluation, Trainer, evaluate},
 };
-use support::team::{Team, config, keys, world_setting};
+use support::team::{CENTRAL_V, FOR_LEARNING, MACKRL, Team, config, keys, world_setting};
 
 /// What a run leaves behind: its metrics as JSON without `sys/`, its weights, and how they play.
 #[derive(PartialEq)]
@@ -63,7 +64,7 @@ fn assert_same_run(found: &Outcome, expected: &Outcome, what: &str) {
 
 #[test]
 fn a_run_gives_the_same_bytes_twice_and_on_any_number_of_threads() {
-    for algorithm in ["algorithm.name=mackrl", "algorithm.name=central-v"] {
+    for algorithm in [MACKRL, CENTRAL_V] {
         let config = short_run(algorithm, "run.seed=1");
         let once = train(&config, 1);
         assert!(once.metrics.len() >= 5, "rows of training and of tests");
@@ -76,25 +77,27 @@ fn a_run_gives_the_same_bytes_twice_and_on_any_number_of_threads() {
 
 #[test]
 fn another_seed_gives_another_run() {
-    let [first, second] = ["run.seed=1", "run.seed=2"]
-        .map(|seed| train(&short_run("algorithm.name=mackrl", seed), 1));
+    let [first, second] =
+        ["run.seed=1", "run.seed=2"].map(|seed| train(&short_run(MACKRL, seed), 1));
     assert!(first.metrics != second.metrics, "the same metrics");
     assert!(first.weights != second.weights, "the same weights");
 }
 
-/// Plays `keys` with `shard_size` environments to an actor.
-fn play(team: &Team, keys: &[EpisodeKey], shard_size: usize, behaviour: Behaviour) -> Vec<Episode> {
-    let weights = team.policy.weights(&team.policy.initialise(3));
-    let mut rollout = team.rollout(keys.len() + 2, shard_size);
-    let settings = RolloutSettings {
+/// Plays `keys` in 2 environments more than that, cut into `shards`.
+fn play(team: &Team, keys: &[EpisodeKey], shards: usize, behaviour: Behaviour) -> Vec<Episode> {
+    let parameters = Parameters::new(team.initialise());
+    let mut collector = team.collector(keys.len() + 2, shards);
+    let settings = PlaySettings {
         behaviour,
         recording: Recording::ForLearning,
     };
-    rollout
-        .play(&weights, keys, settings)
+    collector
+        .play(&parameters, keys, settings)
         .expect("masks agree with the world");
-    let batches = rollout.batches();
-    batches.flat_map(|batch| batch.episodes.clone()).collect()
+    let pieces = collector.pieces();
+    pieces
+        .flat_map(|piece| piece.experience.episodes.clone())
+        .collect()
 }
 
 #[test]
@@ -106,20 +109,44 @@ fn an_episode_is_a_function_of_its_key_whoever_is_played_beside_it() {
         ("matrix-game", "all"),
     ] {
         let map = world_setting(map);
-        let partitions = format!("algorithm.partitions={partitions}");
-        let team = Team::new(&[&map, &partitions, "algorithm.hidden=13"]);
+        let team = Team::mackrl(
+            &[&map],
+            &format!("hidden = 13\npartitions = {partitions:?}"),
+        );
         for behaviour in [Behaviour::sampled(0.3), Behaviour::GREEDY] {
             let alone: Vec<Episode> = (keys.iter())
-                .flat_map(|&key| play(&team, &[key], 1, behaviour))
+                .flat_map(|&key| play(&team, &[key], 3, behaviour))
                 .collect();
-            for shard_size in [1, 2, 3, 9] {
-                let together = play(&team, &keys, shard_size, behaviour);
-                assert!(together == alone, "{map}, shards of {shard_size}");
+            for shards in [9, 5, 3, 1] {
+                let together = play(&team, &keys, shards, behaviour);
+                assert!(together == alone, "{map}, {shards} shards");
             }
             let backwards: Vec<EpisodeKey> = keys.iter().rev().copied().collect();
-            let mut reversed = play(&team, &backwards, 4, behaviour);
+            let mut reversed = play(&team, &backwards, 2, behaviour);
             reversed.reverse();
             assert!(reversed == alone, "{map}, in another order");
         }
     }
+}
+
+#[test]
+fn eight_shards_on_one_thread_and_on_eight_learn_the_same_bits() {
+    let learn = |threads: usize| {
+        let team = Team::mackrl(&["env.map=3m"], "hidden = 13");
+        let mut algorithm = team.actor_critic("hidden = 13", threads);
+        let environments = team.world.environments(13);
+        let mut collector = Collector::new(algorithm.policy(), environments, 8, threads);
+        let mut reports = Vec::new();
+        for _ in 0..3 {
+            let played = collector.play(algorithm.parameters(), &keys(13), FOR_LEARNING);
+            played.expect("masks agree with the world");
+            let mut batch: Vec<_> = collector.pieces().collect();
+            assert_eq!(batch.len(), 8);
+            let report = algorithm.learn(&mut batch, &mut Default::default());
+            reports.push(report.expect("finite gradients"));
+        }
+        (reports, algorithm.state())
+    };
+    let once = learn(1);
+    assert!(learn(8) == once, "the number of threads changes a result");
 }

@@ -6,13 +6,14 @@ use std::collections::BTreeSet;
 
 use mackrl::{
     common_knowledge::{common_knowledge, recursion::Recursion},
-    hierarchy::{Path, Sampler},
     marginalisation::reference::{Choice, Controller},
     partition::{Pairs, all_partitions},
-    policy::{DELEGATE, Mode},
+    policy::{Mode, Part, Path, Sampler},
 };
 use mackrl_env::{Action, AgentId, Draw, EntityId, EntitySet, EpisodeKey, Stream};
-use support::{MASKED, Numbers, Tables, actions, assert_close, ids, log_softmax};
+use support::{
+    AGENTS, DELEGATE, MASKED, Numbers, PAIRS, TEAM, Tables, actions, assert_close, ids, log_softmax,
+};
 
 type Entities = BTreeSet<usize>;
 
@@ -168,7 +169,16 @@ impl Team {
     }
 
     fn controller(&self) -> Controller {
-        let single = |a: usize| Controller::of_agent(AgentId::new(a), &self.single[a]);
+        let single = |a: usize| {
+            let choices = self.single[a].iter().enumerate();
+            let choices = choices.map(|(u, &p)| {
+                let alone = vec![(AgentId::new(a), Action::new(u))];
+                (p, Choice::Act(alone))
+            });
+            Controller {
+                choices: choices.collect(),
+            }
+        };
         let act = |members: &[usize], number: usize| {
             let digits =
                 (0..members.len()).map(|i| number / A.pow(u32::try_from(i).expect("small")) % A);
@@ -246,15 +256,13 @@ fn equation_5_the_marginal_is_the_sum_over_partitions_and_delegations() {
 fn sum_over_paths(tables: &Tables, actions_n: &[Action]) -> f64 {
     let of_agent = |a: AgentId| tables.agent_row(a)[actions_n[a.index()].index()].exp();
     let mut total = 0.0;
-    for (partition, log_p) in tables.partitions.iter().zip(&tables.log_p_selector_p) {
+    for (partition, log_p) in tables.partitions.iter().zip(&tables.levels[TEAM]) {
         for delegations in 0..1_usize << partition.pairs().len() {
             let mut path = log_p.exp();
             for (i, pair) in partition.pairs().iter().enumerate() {
                 let row = tables.pair_row(*pair);
                 let [a, b] = pair.agents();
-                let joint = tables
-                    .shape
-                    .column(actions_n[a.index()], actions_n[b.index()]);
+                let joint = tables.column(*pair, actions_n);
                 path *= if delegations >> i & 1 == 1 {
                     row[DELEGATE].exp() * of_agent(a) * of_agent(b)
                 } else {
@@ -302,10 +310,10 @@ fn equation_6_the_policy_gradient_is_the_advantage_times_the_gradient_of_log_p()
 
 /// Lengths of the rows that the entries of a table form, in their order.
 fn row_lengths(tables: &Tables) -> Vec<usize> {
-    let shape = tables.shape;
+    let agents = tables.agents();
     let mut lengths = vec![tables.partitions.len()];
-    lengths.extend(vec![shape.columns(); shape.pairs()]);
-    lengths.extend(vec![shape.actions; shape.agents]);
+    lengths.extend(vec![tables.columns(PAIRS); agents * (agents - 1) / 2]);
+    lengths.extend(vec![tables.actions(); agents]);
     lengths
 }
 
@@ -356,14 +364,17 @@ fn algorithm_1_samples_a_partition_then_its_pairs_then_those_who_are_left() {
     for episode in 0..500 {
         let key = EpisodeKey::new(7, Stream::Training, episode);
         let step = 11;
-        let partition = invert(&tables.log_p_selector_p, key.uniform(step, Draw::Selector));
+        let partition = invert(&tables.levels[TEAM], key.uniform(step, Draw::Selector));
         let mut expected_n = vec![None; 5];
         for pair in tables.partitions[partition].pairs() {
             let draw = key.uniform(step, Draw::Pair(pair.index()));
-            let chosen = tables
-                .shape
-                .joint_action(invert(tables.pair_row(*pair), draw));
-            for (agent, action) in pair.agents().into_iter().zip(chosen.into_iter().flatten()) {
+            let column = invert(tables.pair_row(*pair), draw);
+            if column == DELEGATE {
+                continue;
+            }
+            // u_d comes first, then 𝓤^a × 𝓤^a' with the actions of the higher agent side by side.
+            let chosen = [(column - 1) / 3, (column - 1) % 3].map(Action::new);
+            for (agent, action) in pair.agents().into_iter().zip(chosen) {
                 expected_n[agent.index()] = Some(action);
                 jointly += 1;
             }
@@ -380,8 +391,8 @@ fn algorithm_1_samples_a_partition_then_its_pairs_then_those_who_are_left() {
             step,
             mode: Mode::Sampled,
         };
-        sampler.sample(&tables.table(), &mut actions_n, &mut path);
-        assert_eq!(path.partition, partition);
+        sampler.walk(&tables.table(), None, &mut actions_n, &mut path);
+        assert_eq!(path.division(), partition);
         assert_eq!(
             actions_n.into_iter().map(Some).collect::<Vec<_>>(),
             expected_n
@@ -419,22 +430,28 @@ fn algorithm_1_in_general_samples_each_joint_action_as_often_as_equation_5_says(
 fn table_1_three_agents_have_one_selector_three_pair_controllers_and_three_agent_controllers() {
     let tables = Tables::random(53, 3, 5);
     let table = tables.table();
+    let row = |level: usize, group: usize| table.row(Part { level, group });
     assert_eq!(
-        table.selector().len(),
+        row(TEAM, 0).len(),
         3,
         "the selector chooses among three partitions"
     );
     assert_eq!(Pairs::new(3).count(), 3);
+    let groups = tables.declaration.levels().iter();
+    let groups: Vec<usize> = groups.map(|level| level.groups.len()).collect();
+    assert_eq!(groups, [1, 3, 3]);
     for (partition, alone) in all_partitions(3).iter().zip(ids(&[0, 1, 2])) {
         assert_eq!(partition.pairs().len(), 1);
         assert_eq!(partition.singleton(), Some(alone));
     }
     for pair in Pairs::new(3).iter() {
         assert_eq!(
-            table.pair(pair.index()).len(),
+            row(PAIRS, pair.index()).len(),
             1 + 5 * 5,
             "u_d beside U^a × U^a'"
         );
     }
-    assert_eq!(tables.log_p_agent_na.len(), 3 * 5);
+    for agent in 0..3 {
+        assert_eq!(row(AGENTS, agent).len(), 5);
+    }
 }

@@ -10,7 +10,7 @@ use mackrl_run::{
     config::Config,
     training::{Episodes, Evaluation, Trainer, assembly, evaluate, evaluate_in},
 };
-use support::team::config;
+use support::team::{CENTRAL_V, MACKRL, config};
 
 /// Trains to the end and plays `episodes` greedy episodes that training has not seen.
 fn train_and_evaluate(config: &Config, episodes: usize) -> Evaluation {
@@ -49,7 +49,7 @@ fn a_team_learns_to_win_three_marines_against_three() {
 #[test]
 #[ignore = "minutes"]
 fn every_seed_and_both_algorithms_learn_to_win_three_marines_against_three() {
-    for algorithm in ["algorithm.name=mackrl", "algorithm.name=central-v"] {
+    for algorithm in [MACKRL, CENTRAL_V] {
         for seed in ["run.seed=1", "run.seed=2", "run.seed=3"] {
             let settings = ["env.map=3m", "env.spawn_scatter=0", "run.steps_env=300000"];
             let config = config(&[&settings[..], &[algorithm, seed]].concat());

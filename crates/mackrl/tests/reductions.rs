@@ -5,18 +5,17 @@ mod support;
 use mackrl::{
     marginalisation::{MarginalGradient, log_likelihood, log_likelihood_with_gradient},
     partition::{PartitionBuffer, PartitionSchedule, all_partitions},
-    policy::{DELEGATE, PolicyTable},
+    policy::PolicyTable,
 };
-use mackrl_env::{EpisodeKey, Stream};
+use mackrl_env::{AgentId, EpisodeKey, Stream};
 use support::{
-    MASKED, Tables, assert_close,
+    AGENTS, DELEGATE, MASKED, PAIRS, TEAM, Tables, assert_close,
     team::{Team, keys, norm, world_setting},
 };
 
 /// `Σ_a log π_a(u_a)`, in the order in which a partition names the agents.
 fn independent(tables: &Tables, actions_n: &[mackrl_env::Action]) -> f64 {
-    let table = tables.table();
-    let agent = |n: usize| table.agent(n)[actions_n[n].index()];
+    let agent = |n: usize| tables.agent_row(AgentId::new(n))[actions_n[n].index()];
     let partition = &tables.partitions[0];
     let pairs: f64 = partition
         .pairs()
@@ -39,11 +38,9 @@ fn delegating_always_equals_independent_agents_exactly() {
                 assert_eq!(tables.log_likelihood(&actions_n), expected);
                 let gradient = tables.gradient(&actions_n);
                 let weight = if expected > MASKED { 1.0 } else { 0.0 };
-                assert!(
-                    gradient.agent_n.iter().all(|&w| w == weight),
-                    "{gradient:?}"
-                );
-                assert!(gradient.joint_k.iter().all(|&w| w == 0.0), "{gradient:?}");
+                let [agents, pairs] = [AGENTS, PAIRS].map(|level| &gradient.levels[level].joint_g);
+                assert!(agents.iter().all(|&w| w == weight), "{gradient:?}");
+                assert!(pairs.iter().all(|&w| w == 0.0), "{gradient:?}");
             }
         }
     }
@@ -57,7 +54,7 @@ fn delegating_always_equals_independent_agents_whatever_the_selector_does() {
             let expected = independent(&tables, &actions_n);
             if expected > MASKED {
                 assert_close(tables.log_likelihood(&actions_n), expected, 1e-14);
-                for weight in tables.gradient(&actions_n).agent_n {
+                for &weight in &tables.gradient(&actions_n).levels[AGENTS].joint_g {
                     assert_close(weight, 1.0, 1e-14);
                 }
             } else {
@@ -71,15 +68,15 @@ fn delegating_always_equals_independent_agents_whatever_the_selector_does() {
 fn never_delegating_with_one_pair_equals_a_joint_learner_exactly() {
     let tables = Tables::random(7, 2, 5).never_delegating(11);
     for actions_n in tables.joint_actions() {
-        let column = tables.shape.column(actions_n[0], actions_n[1]);
+        let pair = tables.partitions[0].pairs()[0];
         assert_eq!(
             tables.log_likelihood(&actions_n),
-            tables.log_p_pair_kc[column]
+            tables.pair_row(pair)[tables.column(pair, &actions_n)]
         );
         let gradient = tables.gradient(&actions_n);
-        assert_eq!(gradient.joint_k, [1.0]);
-        assert_eq!(gradient.delegate_k, [0.0]);
-        assert_eq!(gradient.agent_n, [0.0, 0.0]);
+        assert_eq!(gradient.levels[PAIRS].joint_g, [1.0]);
+        assert_eq!(gradient.levels[PAIRS].division_gd, [0.0]);
+        assert_eq!(gradient.levels[AGENTS].joint_g, [0.0, 0.0]);
     }
 }
 
@@ -87,7 +84,7 @@ fn never_delegating_with_one_pair_equals_a_joint_learner_exactly() {
 fn a_team_of_one_acts_on_its_own_policy() {
     let tables = Tables::random(2, 1, 7);
     for actions_n in tables.joint_actions() {
-        let expected = tables.log_p_agent_na[actions_n[0].index()];
+        let expected = tables.levels[AGENTS][actions_n[0].index()];
         assert_eq!(tables.log_likelihood(&actions_n), expected);
     }
 }
@@ -102,14 +99,13 @@ fn one_partition_makes_the_likelihood_a_product_over_its_pairs() {
     for step in 0..7 {
         let partitions = plan.in_force(&key, step, &mut buffer).to_vec();
         let tables = Tables::random_with(step as u64, 2, partitions);
-        let table = tables.table();
         for actions_n in tables.joint_actions() {
-            let p = |n: usize| table.agent(n)[actions_n[n].index()].exp();
+            let p = |n: usize| tables.agent_row(AgentId::new(n))[actions_n[n].index()].exp();
             let mut product = 1.0;
             for pair in tables.partitions[0].pairs() {
-                let [a, b] = pair.agents().map(mackrl_env::AgentId::index);
-                let row = table.pair(pair.index());
-                let joint = row[tables.shape.column(actions_n[a], actions_n[b])].exp();
+                let [a, b] = pair.agents().map(AgentId::index);
+                let row = tables.pair_row(*pair);
+                let joint = row[tables.column(*pair, &actions_n)].exp();
                 product *= joint + row[DELEGATE].exp() * p(a) * p(b);
             }
             if let Some(alone) = tables.partitions[0].singleton() {
@@ -130,11 +126,11 @@ fn a_pair_outside_every_partition_in_force_is_never_read() {
         tables.log_likelihood(&actions_n),
         tables.gradient(&actions_n),
     );
-    let columns = tables.shape.columns();
+    let columns = tables.columns(PAIRS);
     let in_force: Vec<usize> = (tables.partitions[0].pairs().iter())
         .map(|pair| pair.index())
         .collect();
-    for (k, row) in tables.log_p_pair_kc.chunks_mut(columns).enumerate() {
+    for (k, row) in tables.levels[PAIRS].chunks_mut(columns).enumerate() {
         if !in_force.contains(&k) {
             row.fill(f64::NAN);
         }
@@ -152,13 +148,14 @@ fn single_precision_gives_the_same_numbers_with_fewer_digits() {
     let single =
         |row: &[f64]| -> Vec<f32> { row.iter().map(|&x| mackrl::Real::from_f64(x)).collect() };
     let (selector, pair, agent) = (
-        single(&tables.log_p_selector_p),
-        single(&tables.log_p_pair_kc),
-        single(&tables.log_p_agent_na),
+        single(&tables.levels[TEAM]),
+        single(&tables.levels[PAIRS]),
+        single(&tables.levels[AGENTS]),
     );
-    let table = PolicyTable::new(tables.shape, &tables.partitions, &selector, &pair, &agent)
+    let levels = [&selector[..], &pair, &agent];
+    let table = PolicyTable::new(&tables.declaration, &tables.in_force, &levels)
         .expect("as in double precision");
-    let mut gradient = MarginalGradient::new(tables.shape, 0);
+    let mut gradient = MarginalGradient::default();
     for actions_n in tables.joint_actions() {
         let expected = tables.log_likelihood(&actions_n);
         let log_p = log_likelihood_with_gradient(&table, &actions_n, &mut gradient);
@@ -168,22 +165,18 @@ fn single_precision_gives_the_same_numbers_with_fewer_digits() {
             continue;
         }
         assert_close(f64::from(log_p), expected, 1e-6);
-        for (found, expected) in gradient
-            .agent_n
-            .iter()
-            .zip(tables.gradient(&actions_n).agent_n)
-        {
-            assert_close(f64::from(*found), expected, 1e-5);
+        let found = gradient.levels[AGENTS].joint_g.iter();
+        for (found, expected) in found.zip(&tables.gradient(&actions_n).levels[AGENTS].joint_g) {
+            assert_close(f64::from(*found), *expected, 1e-5);
         }
     }
 }
 
 /// A hierarchy and a Central-V team with the same agent controllers, and their parameters.
-fn hierarchy_and_central_v(settings: &[&str], delegation: &str) -> [(Team, Vec<f32>); 2] {
-    let mackrl = Team::new(&[settings, &["algorithm.hidden=11", delegation]].concat());
-    let algorithm = "algorithm.name=central-v";
-    let central = Team::new(&[settings, &["algorithm.hidden=11", algorithm]].concat());
-    let parameters = mackrl.policy.initialise(3);
+fn hierarchy_and_central_v(world: &[&str], delegation: &str) -> [(Team, Vec<f32>); 2] {
+    let mackrl = Team::mackrl(world, &format!("hidden = 11\n{delegation}"));
+    let central = Team::central_v(world, "hidden = 11");
+    let parameters = mackrl.initialise();
     let agents = mackrl.places("agent_controller");
     let own = agents.iter().map(|&place| parameters[place]).collect();
     [(mackrl, parameters), (central, own)]
@@ -194,7 +187,7 @@ fn the_hierarchy_that_always_delegates_is_central_v() {
     for map in ["3m", "2s3z", "matrix-game"] {
         let map = world_setting(map);
         let [(mackrl, parameters), (central, own)] =
-            hierarchy_and_central_v(&[&map], "algorithm.delegation=always");
+            hierarchy_and_central_v(&[&map], r#"delegation = "always""#);
         let found = mackrl.learnable(&parameters, &keys(5));
         let expected = central.learnable(&own, &keys(5));
         assert_eq!(found.episodes, expected.episodes, "{map}");
@@ -217,15 +210,11 @@ fn the_hierarchy_that_always_delegates_is_central_v() {
 
 #[test]
 fn never_delegating_two_who_see_each_other_is_a_joint_learner() {
-    let team = Team::new(&[
-        "env.name=matrix-game",
-        "env.common_knowledge=1.0",
-        "algorithm.delegation=never",
-        "algorithm.hidden=7",
-    ]);
+    let world = ["env.name=matrix-game", "env.common_knowledge=1.0"];
+    let team = Team::mackrl(&world, "hidden = 7\ndelegation = \"never\"");
     assert!(team.places("pair_selector").is_empty(), "one partition");
     let agents = team.places("agent_controller");
-    let mut parameters = team.policy.initialise(3);
+    let mut parameters = team.initialise();
     let played = team.learnable(&parameters, &keys(13));
     assert!(norm(&played.gradient_at(&agents)) == 0.0, "agents learn");
     assert!(
@@ -244,7 +233,7 @@ fn never_delegating_two_who_see_each_other_is_a_joint_learner() {
 fn never_delegating_without_common_knowledge_is_central_v() {
     let settings = ["env.name=matrix-game", "env.common_knowledge=0.0"];
     let [(mackrl, parameters), (central, own)] =
-        hierarchy_and_central_v(&settings, "algorithm.delegation=never");
+        hierarchy_and_central_v(&settings, r#"delegation = "never""#);
     let found = mackrl.learnable(&parameters, &keys(13));
     let expected = central.learnable(&own, &keys(13));
     assert_eq!(found.episodes, expected.episodes);
@@ -255,11 +244,12 @@ fn never_delegating_without_common_knowledge_is_central_v() {
 #[test]
 fn two_agents_have_one_partition_whatever_the_schedule() {
     let play = |partitions: &str| {
-        let team = Team::new(&["env.name=matrix-game", "algorithm.hidden=7", partitions]);
-        let played = team.learnable(&team.policy.initialise(3), &keys(11));
+        let settings = format!("hidden = 7\npartitions = {partitions:?}");
+        let team = Team::mackrl(&["env.name=matrix-game"], &settings);
+        let played = team.learnable(&team.initialise(), &keys(11));
         (played.episodes, played.objective, played.gradient)
     };
-    let all = play("algorithm.partitions=all");
-    assert_eq!(all, play("algorithm.partitions=round-robin"));
-    assert_eq!(all, play("algorithm.partitions=sampled:1"));
+    let all = play("all");
+    assert_eq!(all, play("round-robin"));
+    assert_eq!(all, play("sampled:1"));
 }

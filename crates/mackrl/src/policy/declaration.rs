@@ -551,7 +551,7 @@ mod tests {
     #[test]
     fn columns_count_divisions_first_and_then_joint_actions() {
         let declaration = Declaration::fours([8, 14], Delegation::Learned).unwrap();
-        let actions: Vec<mackrl_env::Action> = (0..8).map(mackrl_env::Action::new).collect();
+        let actions: Vec<Action> = (0..8).map(Action::new).collect();
         let [team, four, pair, agent] = declaration.levels() else {
             panic!("four levels");
         };

@@ -8,21 +8,29 @@ pub(crate) mod team;
 
 use mackrl::{
     marginalisation::{MarginalGradient, log_likelihood, log_likelihood_with_gradient},
-    partition::{Pair, Partition, all_partitions},
-    policy::{DELEGATE, PolicyShape, PolicyTable},
+    partition::{Pair, Partition, PartitionSchedule, all_partitions},
+    policy::{Declaration, Delegation, Division, Part, PolicyTable, Selection},
 };
 use mackrl_env::{Action, AgentId, Draw, EpisodeKey, Stream};
+
+pub(crate) use mackrl::{marginalisation::pairwise::DELEGATE, policy::TEAM};
+
+/// The levels of the pairwise hierarchy below the team.
+pub(crate) const PAIRS: usize = 1;
+pub(crate) const AGENTS: usize = 2;
 
 pub(crate) const MASKED: f64 = f64::NEG_INFINITY;
 
 /// An owned table in `f64`.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Tables {
-    pub(crate) shape: PolicyShape,
+    pub(crate) declaration: Declaration,
+    /// The partitions in force, of the pairwise hierarchy.
     pub(crate) partitions: Vec<Partition>,
-    pub(crate) log_p_selector_p: Vec<f64>,
-    pub(crate) log_p_pair_kc: Vec<f64>,
-    pub(crate) log_p_agent_na: Vec<f64>,
+    /// The divisions of the team in force.
+    pub(crate) in_force: Vec<Division>,
+    /// The rows of each level, \[G, C\].
+    pub(crate) levels: Vec<Vec<f64>>,
 }
 
 /// Numbers that depend on a seed alone.
@@ -63,56 +71,69 @@ impl Tables {
     /// Random policies for all partitions. Some actions are not available; of some pairs it is commonly known that fewer
     /// are, of others that none is.
     pub(crate) fn random(seed: u64, agents: usize, actions: usize) -> Self {
-        Self::random_with(seed, actions, all_partitions(agents))
+        let all = declaration(agents, actions, PartitionSchedule::All);
+        let tables = Self::random_of(seed, all, all_partitions(agents));
+        assert_eq!(
+            tables.in_force,
+            tables.declaration.levels()[TEAM].divisions_gd[0]
+        );
+        tables
     }
 
+    /// The same for some partitions, with a selector that chooses among them.
     pub(crate) fn random_with(seed: u64, actions: usize, partitions: Vec<Partition>) -> Self {
         let agents = partitions[0].agents();
-        let shape = PolicyShape { agents, actions };
+        let any = declaration(agents, actions, PartitionSchedule::RoundRobin);
+        Self::random_of(seed, any, partitions)
+    }
+
+    fn random_of(seed: u64, declaration: Declaration, partitions: Vec<Partition>) -> Self {
         let mut numbers = Numbers::new(seed);
-        let available_na: Vec<bool> = (0..agents)
-            .flat_map(|_| numbers.available(actions))
-            .collect();
-        let log_p_agent_na = available_na
-            .chunks(actions)
-            .flat_map(|available_a| random_row(&mut numbers, available_a))
-            .collect();
-        let mut log_p_pair_kc = Vec::new();
-        for a in 0..agents {
-            for b in a + 1..agents {
-                let blind = numbers.uniform() < 0.2;
-                let mut known = |agent: usize, u: usize| {
-                    available_na[agent * actions + u] && !blind && numbers.uniform() < 0.9
-                };
-                let known_a: Vec<bool> = (0..actions).map(|u| known(a, u)).collect();
-                let known_b: Vec<bool> = (0..actions).map(|u| known(b, u)).collect();
-                let joint = |column: usize| {
-                    column == DELEGATE
-                        || known_a[(column - 1) / actions] && known_b[(column - 1) % actions]
-                };
-                let mask_c: Vec<bool> = (0..shape.columns()).map(joint).collect();
-                log_p_pair_kc.extend(random_row(&mut numbers, &mask_c));
-            }
-        }
-        let log_p_selector_p = random_row(&mut numbers, &vec![true; partitions.len()]);
+        let [agents, pairs] = small_groups(&mut numbers, &declaration, PAIRS);
+        let selector = random_row(&mut numbers, &vec![true; partitions.len()]);
         Self {
-            shape,
+            in_force: partitions.iter().map(Division::from).collect(),
+            declaration,
             partitions,
-            log_p_selector_p,
-            log_p_pair_kc,
-            log_p_agent_na,
+            levels: vec![selector, pairs, agents],
         }
+    }
+
+    /// Random policies for team → fours → pairs → agents. Some divisions are impossible.
+    pub(crate) fn random_fours(seed: u64, agents: usize, actions: usize) -> Self {
+        let declaration = Declaration::fours([agents, actions], Delegation::Learned);
+        let declaration = declaration.expect("a small team");
+        let mut numbers = Numbers::new(seed);
+        let [alone, pairs] = small_groups(&mut numbers, &declaration, PAIRS + 1);
+        let mut divided = |level: usize| -> Vec<f64> {
+            let level = &declaration.levels()[level];
+            let rows = level.groups.iter().flat_map(|_| {
+                let available = numbers.available(level.divisions);
+                random_row(&mut numbers, &available)
+            });
+            rows.collect()
+        };
+        let levels = vec![divided(TEAM), divided(1), pairs, alone];
+        Self {
+            in_force: declaration.levels()[TEAM].divisions_gd[0].clone(),
+            declaration,
+            partitions: Vec::new(),
+            levels,
+        }
+    }
+
+    pub(crate) fn agents(&self) -> usize {
+        self.declaration.agents()
+    }
+
+    pub(crate) fn actions(&self) -> usize {
+        self.declaration.actions()
     }
 
     pub(crate) fn table(&self) -> PolicyTable<'_, f64> {
-        PolicyTable::new(
-            self.shape,
-            &self.partitions,
-            &self.log_p_selector_p,
-            &self.log_p_pair_kc,
-            &self.log_p_agent_na,
-        )
-        .expect("the tables fit their shape")
+        let levels: Vec<&[f64]> = self.levels.iter().map(Vec::as_slice).collect();
+        PolicyTable::new(&self.declaration, &self.in_force, &levels)
+            .expect("the tables fit their declaration")
     }
 
     pub(crate) fn log_likelihood(&self, actions_n: &[Action]) -> f64 {
@@ -120,22 +141,44 @@ impl Tables {
     }
 
     pub(crate) fn gradient(&self, actions_n: &[Action]) -> MarginalGradient<f64> {
-        let mut gradient = MarginalGradient::new(self.shape, self.partitions.len());
+        let mut gradient = MarginalGradient::default();
         log_likelihood_with_gradient(&self.table(), actions_n, &mut gradient);
         gradient
     }
 
+    /// The column of a pair's joint action.
+    pub(crate) fn column(&self, pair: Pair, actions_n: &[Action]) -> usize {
+        let level = &self.declaration.levels()[PAIRS];
+        let column = level.column(pair.index(), self.actions(), actions_n);
+        column.expect("pairs act jointly")
+    }
+
     pub(crate) fn pair_row(&self, pair: Pair) -> &[f64] {
-        self.table().pair(pair.index())
+        self.table().row(Part {
+            level: PAIRS,
+            group: pair.index(),
+        })
     }
 
     pub(crate) fn agent_row(&self, agent: AgentId) -> &[f64] {
-        self.table().agent(agent.index())
+        self.table().row(Part {
+            level: self.declaration.alone(),
+            group: agent.index(),
+        })
+    }
+
+    /// Length of a row of this level.
+    pub(crate) fn columns(&self, level: usize) -> usize {
+        match level {
+            TEAM => self.in_force.len(),
+            _ => self.declaration.levels()[level].columns(self.actions()),
+        }
     }
 
     /// Makes every pair delegate.
     pub(crate) fn always_delegating(mut self) -> Self {
-        for row in self.log_p_pair_kc.chunks_mut(self.shape.columns()) {
+        let columns = self.columns(PAIRS);
+        for row in self.levels[PAIRS].chunks_mut(columns) {
             row.fill(MASKED);
             row[DELEGATE] = 0.0;
         }
@@ -145,7 +188,8 @@ impl Tables {
     /// Makes no pair delegate: all joint actions of two available actions get a probability.
     pub(crate) fn never_delegating(mut self, seed: u64) -> Self {
         let mut numbers = Numbers::new(seed);
-        for row in self.log_p_pair_kc.chunks_mut(self.shape.columns()) {
+        let columns = self.columns(PAIRS);
+        for row in self.levels[PAIRS].chunks_mut(columns) {
             let mut available = vec![true; row.len()];
             available[DELEGATE] = false;
             row.copy_from_slice(&random_row(&mut numbers, &available));
@@ -155,7 +199,7 @@ impl Tables {
 
     /// All A^N joint actions.
     pub(crate) fn joint_actions(&self) -> Vec<Vec<Action>> {
-        let PolicyShape { agents, actions } = self.shape;
+        let [agents, actions] = [self.agents(), self.actions()];
         let count = (0..agents).fold(1, |count, _| count * actions);
         (0..count)
             .map(|number| {
@@ -171,32 +215,73 @@ impl Tables {
             .collect()
     }
 
-    /// The gradient of log p(u) with respect to every entry: selector, pairs and agents in one vector, as
-    /// [`Self::entries_mut`] counts them.
+    /// The gradient of log p(u) with respect to every entry: all levels in one vector, as [`Self::entries_mut`] counts them.
     pub(crate) fn dense_gradient(&self, actions_n: &[Action]) -> Vec<f64> {
-        let gradient = self.gradient(actions_n);
-        let mut pair_kc = vec![0.0; self.log_p_pair_kc.len()];
-        let mut agent_na = vec![0.0; self.log_p_agent_na.len()];
-        let columns = self.shape.columns();
-        for pair in mackrl::partition::Pairs::new(self.shape.agents).iter() {
-            let k = pair.index();
-            let [a, b] = pair.agents().map(|agent| actions_n[agent.index()]);
-            pair_kc[k * columns + DELEGATE] = gradient.delegate_k[k];
-            pair_kc[k * columns + self.shape.column(a, b)] = gradient.joint_k[k];
-        }
-        for (n, action) in actions_n.iter().enumerate() {
-            agent_na[n * self.shape.actions + action.index()] = gradient.agent_n[n];
-        }
-        [gradient.selector_p, pair_kc, agent_na].concat()
+        self.dense(&self.gradient(actions_n), actions_n)
     }
 
-    /// Every entry of the three levels.
-    pub(crate) fn entries_mut(&mut self) -> impl Iterator<Item = &mut f64> {
-        self.log_p_selector_p
-            .iter_mut()
-            .chain(&mut self.log_p_pair_kc)
-            .chain(&mut self.log_p_agent_na)
+    /// The same of a gradient that was computed elsewhere.
+    pub(crate) fn dense(&self, gradient: &MarginalGradient<f64>, actions_n: &[Action]) -> Vec<f64> {
+        let mut dense = Vec::new();
+        for (place, level) in self.declaration.levels().iter().enumerate() {
+            for group in 0..level.groups.len() {
+                let part = Part {
+                    level: place,
+                    group,
+                };
+                let mut row = vec![0.0; self.columns(place)];
+                let divided = gradient.divisions(part);
+                row[..divided.len()].copy_from_slice(divided);
+                if let Some(column) = level.column(group, self.actions(), actions_n) {
+                    row[column] = gradient.joint(part);
+                }
+                dense.extend(row);
+            }
+        }
+        dense
     }
+
+    /// Every entry of all levels.
+    pub(crate) fn entries_mut(&mut self) -> impl Iterator<Item = &mut f64> {
+        self.levels.iter_mut().flatten()
+    }
+}
+
+fn declaration(agents: usize, actions: usize, schedule: PartitionSchedule) -> Declaration {
+    let (selection, delegation) = (Selection::Learned, Delegation::Learned);
+    Declaration::pairwise([agents, actions], schedule, selection, delegation, 1)
+        .expect("a team that is small enough")
+}
+
+/// The rows of single agents and of pairs; a joint action is possible only if both of its actions are.
+fn small_groups(numbers: &mut Numbers, declaration: &Declaration, pairs: usize) -> [Vec<f64>; 2] {
+    let [agents, actions] = [declaration.agents(), declaration.actions()];
+    let available_na: Vec<bool> = (0..agents)
+        .flat_map(|_| numbers.available(actions))
+        .collect();
+    let alone = available_na
+        .chunks(actions)
+        .flat_map(|available_a| random_row(numbers, available_a))
+        .collect();
+    let columns = declaration.levels()[pairs].columns(actions);
+    let mut log_p_pair_kc = Vec::new();
+    for a in 0..agents {
+        for b in a + 1..agents {
+            let blind = numbers.uniform() < 0.2;
+            let mut known = |agent: usize, u: usize| {
+                available_na[agent * actions + u] && !blind && numbers.uniform() < 0.9
+            };
+            let known_a: Vec<bool> = (0..actions).map(|u| known(a, u)).collect();
+            let known_b: Vec<bool> = (0..actions).map(|u| known(b, u)).collect();
+            let joint = |column: usize| {
+                column == DELEGATE
+                    || known_a[(column - 1) / actions] && known_b[(column - 1) % actions]
+            };
+            let mask_c: Vec<bool> = (0..columns).map(joint).collect();
+            log_p_pair_kc.extend(random_row(numbers, &mask_c));
+        }
+    }
+    [alone, log_p_pair_kc]
 }
 
 /// A log-softmax of random logits over what is available.

@@ -103,8 +103,8 @@ fn counters_that_no_run_can_have_are_refused_by_name() {
         trainer.restore(&damaged).unwrap_err().to_string()
     };
     assert_eq!(
-        message("\"format\": 2", "\"format\": 1"),
-        "checkpoint has format 1, expected 2"
+        message("\"format\": 3", "\"format\": 2"),
+        "checkpoint has format 2, expected 3"
     );
     let found = message("\"tests\": 1", "\"tests\": 18446744073709551615");
     assert!(found.contains("as `tests`, expected at most"), "{found}");

@@ -384,3 +384,18 @@ fn check_advantages(advantage_bt: &[Vec<f32>]) -> Result<(), NotFinite> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn advantages_that_are_not_finite_are_named() {
+        let found = check_advantages(&[vec![0.5; 3], vec![0.5, f32::NEG_INFINITY]]);
+        assert_eq!(
+            found.unwrap_err().to_string(),
+            "advantage is -inf at episode 1, step 1"
+        );
+        assert_eq!(check_advantages(&[vec![0.5; 3], vec![]]), Ok(()));
+    }
+}
