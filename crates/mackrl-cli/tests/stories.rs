@@ -161,20 +161,32 @@ fn a_value_out_of_range_says_what_is_expected() {
     hint: algorithm.gamma: Discount γ of one environment step.
     ");
     insta::assert_snapshot!(type_in("config --algorithm qmix").fails(64), @r#"
-    error: --algorithm qmix: `policy.algorithm` is "qmix", expected `mackrl` or `central-v`
-    hint: policy.algorithm: What learns: the hierarchy, or the agent controllers alone.
+    error: --algorithm qmix: `algorithm.name` is "qmix", expected `mackrl` or `central-v`
+    hint: algorithm.name: What learns; which other settings `algorithm` has depends on it.
     "#);
 }
 
 #[test]
+fn a_setting_of_version_0_1_0_is_told_by_its_name_now() {
+    insta::assert_snapshot!(type_in("config --set learner.gamma=0.5").fails(64), @r"
+    error: --set learner.gamma=0.5: `learner.gamma` is called `algorithm.gamma` now
+    hint: `mackrl config --print` lists every setting, `mackrl config --explain KEY` explains one
+    ");
+    insta::assert_snapshot!(type_in("config --map matrix-game --set env.move_amount=5").fails(64), @r"
+    error: --set env.move_amount=5: `env.move_amount` is a setting of `skirmish`, but `env.name` is `matrix-game`
+    hint: `mackrl config --print` lists every setting, `mackrl config --explain KEY` explains one
+    ");
+}
+
+#[test]
 fn an_unknown_preset_names_its_neighbour() {
-    insta::assert_snapshot!(type_in("config --preset papre").fails(64), @"error: unknown preset `papre`, expected default, paper, paper-code, did you mean `paper`?");
+    insta::assert_snapshot!(type_in("config --preset papre").fails(64), @"error: unknown preset `papre`, expected default, fours, paper, paper-code, did you mean `paper`?");
 }
 
 #[test]
 fn an_error_in_a_file_names_file_line_and_column() {
     let folder = tempfile::tempdir().expect("a folder for the story");
-    let text = "[learner]\ngamma = 0.9\nlearning_rate = \"fast\"\n";
+    let text = "[algorithm]\ngamma = 0.9\nlearning_rate = \"fast\"\n";
     std::fs::write(folder.path().join("mine.toml"), text).expect("the folder can be written");
     let story = type_in_folder("config --config mine.toml", folder.path());
     insta::assert_snapshot!(story.fails(64), @r#"
@@ -217,6 +229,7 @@ fn a_setting_is_explained_with_its_value_everywhere() {
       takes              a number in [0, 1]
       built-in           0.8
       preset default     0.8  of the critic's TD(lambda) targets
+      preset fours       0.8
       preset paper       0.8  "TD-lambda of 0.8"
       preset paper-code  0.8
       here               0.5  --set algorithm.lambda=0.5
@@ -240,7 +253,7 @@ fn a_setting_is_explained_with_its_value_everywhere() {
 fn the_schema_is_json_and_every_printed_value_has_its_origin() {
     let schema = type_in("config --schema").succeeds();
     let schema: serde_json::Value = serde_json::from_str(&schema).expect("a JSON object");
-    let gamma = &schema["properties"]["learner"]["properties"]["gamma"];
+    let gamma = &schema["properties"]["algorithm"]["properties"]["gamma"];
     assert_eq!(gamma["maximum"], 1.0, "{schema}");
     let printed = type_in("config --print --json --seed 5").succeeds();
     let printed: Vec<serde_json::Value> = serde_json::from_str(&printed).expect("a JSON array");
@@ -329,7 +342,7 @@ fn a_map_is_shown_with_a_picture_and_the_matrix_game_without() {
     obs_size    5
     state_size  12
 
-    Settings: env.payoffs, .distribution and .common_knowledge; `mackrl reproduce figure5` is the paper's experiment.
+    Settings: env.payoffs, env.distribution and env.common_knowledge; `mackrl reproduce figure5` is the paper's experiment.
     ");
     insta::assert_snapshot!(type_in("maps 2m_vs_2z").fails(64), @r"
     error: maps 2m_vs_2z: unknown map `2m_vs_2z`, did you mean `2m_vs_1z`?

@@ -217,12 +217,12 @@ fn a_broken_plan_is_told_by_line_and_column() {
     let path = folder.path().join("plan.toml");
     fs::write(
         &path,
-        "maps = [\"3m\"]\nseeds = 2\n[settings]\nlearner.gama = 0.5\n",
+        "maps = [\"3m\"]\nseeds = 2\n[settings]\nalgorithm.gama = 0.5\n",
     )
     .expect("a plan");
     let refusal = exits(sweep(&path, &[]), 64);
     assert!(
-        refusal.contains("plan.toml:4:16: unknown key `algorithm.gama`"),
+        refusal.contains("plan.toml:4:18: unknown key `algorithm.gama`"),
         "{refusal}"
     );
     fs::write(&path, [0xFF, 0xFE]).expect("a plan");

@@ -31,7 +31,7 @@ fn worlds_of_the_game_are_refused_in_words() {
     ] {
         let (code, stderr) = failed(words);
         assert_eq!(code, 64, "`{words}`: {stderr}");
-        let said = format!("env.engine is `sc2`, expected `simulator`: {MISSING}");
+        let said = format!("env.name is `sc2`, expected `skirmish`: {MISSING}");
         assert!(stderr.contains(&said), "`{words}`: {stderr}");
     }
 }

@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use mackrl_run::{
-    config::{Config, ConfigBuilder},
+    config::{Config, ConfigBuilder, Registry},
     provenance::{LEARNING_VERSION, sha256},
     training::Trainer,
 };
@@ -20,11 +20,11 @@ const RUNS: [(&str, &str); 4] = [
 fn config(map: &str, algorithm: &str) -> Config {
     let settings = [
         format!("env.map={map}"),
-        format!("policy.algorithm={algorithm}"),
+        format!("algorithm.name={algorithm}"),
         "run.steps_env=3000".to_owned(),
         "run.seed=1".to_owned(),
     ];
-    let preset = ConfigBuilder::new().preset("paper-code");
+    let preset = ConfigBuilder::new(&Registry::built_in()).preset("paper-code");
     let builder = settings
         .iter()
         .try_fold(preset.expect("a shipped preset"), |builder, setting| {

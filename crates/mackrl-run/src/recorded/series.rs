@@ -255,7 +255,7 @@ fn unlike(one: &RecordedRun, other: &RecordedRun, what: &str, values: &[String; 
 mod tests {
     use std::path::PathBuf;
 
-    use mackrl_run::config::Config;
+    use crate::config::Config;
 
     use super::*;
 

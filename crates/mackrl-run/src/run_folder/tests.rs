@@ -73,12 +73,12 @@ fn a_damaged_configuration_is_named_with_file_and_line() {
     let parent = tempfile::tempdir().unwrap();
     let path = free_path(&parent);
     RunFolder::create(&path, &Config::default(), 1).unwrap();
-    fs::write(path.join(CONFIG), "[learner]\ngamma = 7\n").unwrap();
+    fs::write(path.join(CONFIG), "[algorithm]\ngamma = 7\n").unwrap();
     let error = Run::open(&path).unwrap_err();
     assert!(
         error
             .to_string()
-            .contains("config.toml:2:9: `learner.gamma` is 7"),
+            .contains("config.toml:2:9: `algorithm.gamma` is 7"),
         "{error}"
     );
 }

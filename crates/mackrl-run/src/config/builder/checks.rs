@@ -89,16 +89,11 @@ pub(in crate::config) fn world_error(
     origin_of: &dyn Fn(&str) -> Origin,
 ) -> ConfigError {
     match error {
-        WorldError::Settings(SettingsError::Wrong(WrongSetting {
-            name,
-            found,
-            nearest,
-            ..
-        })) if name == "map" => ConfigError::UnknownMap {
-            origin: origin_of("env.map"),
-            name: shortened(found.trim_matches('"')),
-            nearest,
-        },
+        WorldError::Settings(SettingsError::Wrong(wrong)) if wrong.name == "map" => {
+            // The world names its most similar map, however different that is.
+            let name = wrong.found.trim_matches('"');
+            ConfigError::unknown_map(origin_of("env.map"), name, wrong.nearest.as_deref())
+        }
         WorldError::Settings(error) => settings_error("env", error, origin_of),
         WorldError::Text { problem, .. } => ConfigError::Scenario { message: problem },
         error => ConfigError::World {

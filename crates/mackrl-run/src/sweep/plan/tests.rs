@@ -88,7 +88,7 @@ fn errors_name_line_and_column() {
         ),
         (
             "maps = [\"3m\"]\nseeds = 1\n[settings]\nalgorithm.gama = 1\n",
-            "plan.toml:4:1: unknown key `algorithm.gama`, did you mean `algorithm.gamma`?",
+            "plan.toml:4:18: unknown key `algorithm.gama`, did you mean `algorithm.gamma`?",
         ),
         (
             "maps = [\"3m\"]\nseeds = 1\n[settings]\nalgorithm.gamma = 7.0\n",
@@ -108,7 +108,7 @@ fn errors_name_line_and_column() {
         ),
         (
             "maps = [\"3m\"]\nseeds = 1\n[variants.\"../x\"]\nalgorithm.gamma = 0.5\n",
-            "plan.toml:4:17: `../x` is not a name",
+            "plan.toml:4:19: `../x` is not a name",
         ),
         ("maps = [\"3m\"\n", "plan.toml:"),
     ] {
