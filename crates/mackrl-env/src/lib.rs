@@ -35,8 +35,6 @@ pub mod sanity;
 pub mod settings;
 mod world;
 
-use std::sync::Arc;
-
 pub use entity_set::EntitySet;
 pub use environment::{
     Environment, EnvironmentSpec, EpisodeEnd, IllegalAction, Interruption, InvalidSpec,
@@ -46,14 +44,6 @@ pub use ids::{Action, AgentId, EntityId};
 pub use observations::{KnownEntities, LocalView, ObservationMut, Observations};
 pub use random::{Draw, EpisodeKey, Stream};
 pub use world::{Counter, DeclaredKind, Prototype, World, WorldError, WorldKind};
-
-/// The kinds of worlds in this crate: the matrix game, and those of [`sanity`].
-#[must_use]
-pub fn kinds() -> Vec<Arc<dyn WorldKind>> {
-    let mut kinds: Vec<Arc<dyn WorldKind>> = vec![Arc::new(matrix_game::MatrixGameKind)];
-    kinds.extend(sanity::kinds());
-    kinds
-}
 
 #[cfg(doctest)]
 #[doc = include_str!("../../../docs/environments.md")]

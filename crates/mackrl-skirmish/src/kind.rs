@@ -200,7 +200,9 @@ mod tests {
         let defaults = SkirmishKind.defaults();
         let mut names: Vec<&str> = SkirmishKind.settings().iter().map(|s| s.name).collect();
         names.sort_unstable();
-        assert_eq!(names, defaults.keys().collect::<Vec<_>>());
+        let mut of_defaults: Vec<&String> = defaults.keys().collect();
+        of_defaults.sort_unstable();
+        assert_eq!(names, of_defaults);
         assert_eq!(SkirmishKind.build(&defaults).unwrap().name(), "3m");
     }
 

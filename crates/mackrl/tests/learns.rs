@@ -8,7 +8,7 @@ use mackrl::tabular::{Learner, SweepSettings, sweep};
 use mackrl_env::matrix_game::{ObservationDistribution, Payoffs};
 use mackrl_run::{
     config::Config,
-    training::{Episodes, Evaluation, Trainer, assembly, evaluate, evaluate_in},
+    training::{Evaluation, Trainer, evaluate},
 };
 use support::team::{CENTRAL_V, MACKRL, config};
 
@@ -99,34 +99,5 @@ fn networks_play_the_matrix_game_better_than_both_tabular_baselines() {
             found > joint + margin && found > independent + margin,
             "{seed}: {found} against {joint} (joint) and {independent} (independent)"
         );
-    }
-}
-
-/// Each world needs one ability: to act on one's own observation, to remember, to coordinate on common knowledge.
-#[test]
-fn sanity_worlds_are_solved() {
-    let config = config(&[
-        "algorithm.environments=32",
-        "algorithm.learning_rate=0.002",
-        "algorithm.critic_learning_rate=0.005",
-        "algorithm.exploration_steps_env=10000",
-        "run.steps_env=20000",
-        "test.interval_steps_env=20000",
-    ]);
-    for kind in mackrl_env::sanity::kinds() {
-        let built = kind.build(&kind.defaults()).expect("its own defaults");
-        let world = assembly::World::of(built).expect("sizes of a tiny world");
-        let mut trainer = Trainer::in_world(&config, &world, 2).expect("a run that can begin");
-        while !trainer.finished() {
-            trainer.update().expect("finite gradients");
-        }
-        let episodes = Episodes {
-            count: 400,
-            seed: 1,
-        };
-        let found = evaluate_in(&world, &config, &trainer.weights(), episodes, 2);
-        let success = found.expect("its own weights").mean("success");
-        let success = success.expect("a statistic of all three");
-        assert!(success >= 0.95, "{}: {success}", kind.name());
     }
 }
