@@ -269,9 +269,11 @@ mod tests {
                     assert_eq!(names, (world.name(), algorithm.name()));
                     let moves = config.get("env.move_amount");
                     let expected = match (world.name(), preset.name) {
-                        ("matrix-game", _) => None,
-                        (_, "paper-code" | "fours") => Some(toml::Value::Float(5.0)),
-                        _ => Some(toml::Value::Float(2.0)),
+                        ("skirmish" | "sc2", "paper-code" | "fours") => {
+                            Some(toml::Value::Float(5.0))
+                        }
+                        ("skirmish" | "sc2", _) => Some(toml::Value::Float(2.0)),
+                        _ => None,
                     };
                     assert_eq!(moves, expected, "{} in {}", preset.name, world.name());
                 }
