@@ -12,10 +12,9 @@ use std::{
 use sha2::{Digest, Sha256};
 
 /// Folders that results come from, each as its crate's folder in the repository, its package, and its place within.
-const SOURCES: [(&str, &str, &str); 7] = [
+const SOURCES: [(&str, &str, &str); 6] = [
     ("mackrl", "mackrl-core", "src"),
     ("mackrl-run", "mackrl-run", "src"),
-    ("mackrl-run", "mackrl-run", "presets"),
     ("mackrl-env", "mackrl-env", "src"),
     ("mackrl-skirmish", "mackrl-skirmish", "src"),
     ("mackrl-skirmish", "mackrl-skirmish", "maps"),

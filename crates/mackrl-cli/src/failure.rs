@@ -169,7 +169,7 @@ fn of_failure(failure: &Failure) -> Verdict {
 fn of_run(error: &RunError) -> Verdict {
     let resume = |folder: &std::path::Path| format!("`mackrl resume {}`", folder.display());
     let (exit, hint) = match error {
-        RunError::Config(error) => return verdict(error),
+        RunError::Config(error) => return verdict(&**error),
         RunError::Learning(error) => return of_library(error),
         RunError::FolderInUse { .. } => (
             Exit::Usage,

@@ -126,10 +126,16 @@ pub enum RunError {
     },
     /// A configuration that cannot be used.
     #[error(transparent)]
-    Config(#[from] ConfigError),
+    Config(Box<ConfigError>),
     /// What went wrong while learning or playing.
     #[error(transparent)]
     Learning(#[from] mackrl::Error),
+}
+
+impl From<ConfigError> for RunError {
+    fn from(error: ConfigError) -> Self {
+        Self::Config(Box::new(error))
+    }
 }
 
 impl RunError {
