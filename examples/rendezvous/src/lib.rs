@@ -16,7 +16,7 @@ use mackrl_env::{
 const ACTIONS: usize = 6;
 const MOVES: [[i32; 2]; 5] = [[0, 0], [0, -1], [1, 0], [0, 1], [-1, 0]];
 const PRESS: usize = 5;
-const BUTTONS: [[i32; 2]; 2] = [[1, 1], [2, 1]];
+const BUTTONS: [[i32; 2]; 2] = [[0, 1], [1, 1]];
 
 declare_settings! {
     /// The grid and what is on it.
@@ -24,11 +24,11 @@ declare_settings! {
         /// Robots.
         robots: usize = 2, Accepts::integer(2, 16);
         /// Cells of a side.
-        side: i32 = 4, Accepts::integer(4, 64);
+        side: i32 = 3, Accepts::integer(3, 64);
         /// Cells that a robot sees in each direction.
         sight: i32 = 1, Accepts::integer(1, 64);
         /// What a press alone costs.
-        penalty: f32 = 0.5, Accepts::within(0.0, 100.0);
+        penalty: f32 = 0.3, Accepts::within(0.0, 100.0);
         /// Steps of an episode.
         steps: usize = 20, Accepts::integer(1, 1000);
     }
