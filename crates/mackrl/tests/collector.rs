@@ -28,9 +28,11 @@ fn play(episodes: u64) -> Vec<usize> {
     let team = Team::mackrl(&["env.name=matrix-game"], "hidden = 3");
     let parameters = Parameters::new(team.initialise());
     let mut collector = team.collector(5, 3);
-    assert_eq!(collector.environments(), 5);
+    assert_eq!(collector.environments(), 5, "environments");
     for count in [5, episodes] {
-        collector.play(&parameters, &keys(count), GREEDY).unwrap();
+        collector
+            .play(&parameters, &keys(count), GREEDY)
+            .expect("actors choose available actions");
     }
     let pieces = collector.pieces();
     pieces

@@ -93,7 +93,7 @@ fn certify_with(
         seed: 5,
         sampled: Behaviour::sampled(exploration),
     };
-    subject.certify(episodes, |_, _| {}).unwrap()
+    subject.certify(episodes, |_, _| {}).expect("agents answer")
 }
 
 fn certify_honest(team: &Team, episodes: usize) -> Certificate {

@@ -114,7 +114,7 @@ impl Environment for Rendezvous {
 
     fn reset(&mut self, key: EpisodeKey, out: &mut ObservationMut<'_>) {
         let side = self.settings.side;
-        let cell = |draw| (key.uniform(0, Draw::World(draw)) * f64::from(side)).floor() as i32;
+        let cell = |draw| one_of(0..side, key.uniform(0, Draw::World(draw)));
         for (robot, place) in self.cells.iter_mut().enumerate() {
             *place = [cell(2 * robot), cell(2 * robot + 1)];
         }
@@ -184,7 +184,7 @@ impl Environment for Rendezvous {
                 .collect();
             if !is_near(own, *cell, sight) && !unseen.is_empty() {
                 let uniform = key.uniform(self.step, Draw::World(1000 + robot));
-                *cell = unseen[(uniform * unseen.len() as f64) as usize];
+                *cell = one_of(unseen, uniform);
                 has_altered = true;
             }
         }
@@ -217,8 +217,19 @@ impl PriorKnowledge for Grid {
     }
 }
 
+#[expect(clippy::cast_possible_truncation, reason = "features are whole")]
 fn cell(features: &[f32]) -> [i32; 2] {
     [features[0] as i32, features[1] as i32]
+}
+
+/// One of `choices`, which are some, by a number in [0, 1).
+fn one_of<T>(choices: impl IntoIterator<Item = T>, uniform: f64) -> T {
+    let mut choices: Vec<T> = choices.into_iter().collect();
+    let count = choices.len() as f64;
+    let chosen = (1..choices.len())
+        .take_while(|&i| i as f64 <= uniform * count)
+        .count();
+    choices.swap_remove(chosen)
 }
 
 fn is_near(from: [i32; 2], to: [i32; 2], sight: i32) -> bool {

@@ -122,7 +122,7 @@ pub(crate) struct ExecGameArgs {
 /// Lay out a folder that clients take for an installation of StarCraft II
 ///
 /// Holds a program that runs `mackrl sc2 serve`, a marker for each of SMAC's maps, and nothing of the game. A real game in the
-/// folder is left alone. Clients can play SMAC's 23 maps and nothing else: no SMACv2, no feature layers, no bots that build.
+/// folder is left alone. Clients can play SMAC's 23 maps and nothing else: no `SMACv2`, no feature layers, no bots that build.
 ///
 /// Example: `mackrl sc2 install ~/mackrl-sc2 && SC2PATH=~/mackrl-sc2 python my_smac_script.py`
 #[derive(Debug, Args)]
@@ -142,7 +142,7 @@ pub(crate) struct InstallArgs {
 /// only. Dice follow from the seed of the client's game, or from --seed. What comes after `--` are options as the game has them
 /// (-listen, -port, -dataDir, -tempDir, -dataVersion, ...); so started, it ends with its parent.
 ///
-/// Served are SMAC's 23 maps to one client with raw observations; not served are SMACv2, feature layers, rendered images, several
+/// Served are SMAC's 23 maps to one client with raw observations; not served are `SMACv2`, feature layers, rendered images, several
 /// clients, and bots that build. What is refused is named in the error.
 ///
 /// Example: mackrl sc2 serve --port 5000

@@ -97,11 +97,11 @@ pub enum ConfigError {
         /// The key.
         key: String,
         /// The kind that has it.
-        owner: String,
+        owner: Box<str>,
         /// The section.
-        section: String,
+        section: Box<str>,
         /// The kind that is chosen.
-        chosen: String,
+        chosen: Box<str>,
     },
     /// A value of the wrong type or out of its range.
     #[error("{origin}: `{key}` is {found}, expected {expected}")]

@@ -232,6 +232,9 @@ impl Rows {
     ///
     /// # Shapes
     /// Input \[F\], mask \[C\].
+    ///
+    /// # Panics
+    /// If no step was begun, or it has no such row.
     pub fn row_mut(&mut self, row: usize) -> (&mut [f32], Option<&mut [bool]>) {
         let place = self.place(row);
         let step = self.steps.last().expect("a step was begun");

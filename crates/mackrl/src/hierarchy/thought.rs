@@ -52,7 +52,7 @@ pub(super) fn describe(
             {
                 continue;
             }
-            match (level.size(), &declaration.members(part)[..]) {
+            match (level.size(), declaration.members(part)) {
                 (1, &[agent]) => {
                     let taken = action_n[agent.index()];
                     thought
@@ -62,7 +62,7 @@ pub(super) fn describe(
                 (2, &[a, b]) => {
                     thought
                         .pairs
-                        .push(pair(decision, part, [a, b], action_n, posterior))
+                        .push(pair(decision, part, [a, b], action_n, posterior));
                 }
                 (_, members) => thought.groups.push(GroupThought {
                     members: members.to_vec(),

@@ -75,7 +75,8 @@ impl Tables {
         let tables = Self::random_of(seed, all, all_partitions(agents));
         assert_eq!(
             tables.in_force,
-            tables.declaration.levels()[TEAM].divisions_gd[0]
+            tables.declaration.levels()[TEAM].divisions_gd[0],
+            "divisions in force"
         );
         tables
     }

@@ -89,9 +89,14 @@ impl Team {
         let built = built.expect("settings of the algorithm");
         assert_eq!(
             built.policy().layout().tensors(),
-            self.hierarchy.layout().tensors()
+            self.hierarchy.layout().tensors(),
+            "tensors of the team that the kind builds"
         );
-        assert_eq!(built.parameters().values(), self.initialise());
+        assert_eq!(
+            built.parameters().values(),
+            self.initialise(),
+            "initial parameters of the team that the kind builds"
+        );
         self
     }
 
@@ -154,7 +159,11 @@ impl Team {
         let acted_with: Vec<Vec<f32>> = acted_with
             .map(|episode| std::mem::take(&mut episode.log_p_t))
             .collect();
-        assert_eq!(activations.log_p_bt(), acted_with);
+        assert_eq!(
+            activations.log_p_bt(),
+            acted_with,
+            "log p(u) while acting and after"
+        );
         let weight_bt = weights(&episodes);
         let objective = weighted_sum(activations.log_p_bt(), &weight_bt);
         let mut gradient = vec![0.0; parameters.values().len()];

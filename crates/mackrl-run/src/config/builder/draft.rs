@@ -187,9 +187,9 @@ impl<'a> Draft<'a> {
                 origin => Err(ConfigError::ForeignKey {
                     origin,
                     key,
-                    owner,
-                    section: section.to_owned(),
-                    chosen,
+                    owner: owner.into(),
+                    section: section.into(),
+                    chosen: chosen.into(),
                 }),
             };
         }
