@@ -248,7 +248,7 @@ struct RowGradient<'a, R> {
 }
 
 impl<E: Element> RowGradient<'_, E> {
-    /// g_c for an entry of `weights`.
+    /// `g_c` for an entry of `weights`.
     #[inline(always)]
     fn direct<L: Lanes<Element = E>>(&self, lanes: L, &(column, weight): &(usize, E)) -> E {
         let Self { law, log_p, .. } = self;
