@@ -62,8 +62,8 @@ fn marginal(criterion: &mut Criterion) {
         let pairwise =
             Declaration::pairwise([agents, actions], all, selection, Delegation::Learned, 1)
                 .expect("small teams");
-        let fours =
-            Declaration::fours([agents, actions], Delegation::Learned).expect("small teams");
+        let fours = Declaration::fours([agents, actions], Selection::Learned, Delegation::Learned)
+            .expect("small teams");
         measure(&mut group, "partitions", &pairwise);
         measure(&mut group, "divisions into fours", &fours);
     }

@@ -256,6 +256,7 @@ mod tests {
         for robots in [2, 5] {
             let settings = RendezvousSettings {
                 robots,
+                side: 6,
                 ..RendezvousSettings::default()
             };
             let coverage = check_environment(&mut Rendezvous::new(settings), 20);

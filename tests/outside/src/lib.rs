@@ -10,6 +10,7 @@ mod policy;
 use mackrl::{
     Error,
     algorithms::{Algorithm, AlgorithmKind, Team},
+    policy::Policy,
 };
 use mackrl_env::{
     EnvironmentSpec, declare_settings,
@@ -63,5 +64,9 @@ impl AlgorithmKind for ReinforceKind {
         let settings =
             ReinforceSettings::read(table).map_err(|error| Error::Config(error.to_string()))?;
         Ok(Box::new(Reinforce::new(settings, team)))
+    }
+
+    fn size(&self, _table: &toml::Table, team: Team<'_>) -> Result<usize, Error> {
+        Ok(LinearPolicy::new(team.spec).layout().len())
     }
 }

@@ -69,16 +69,8 @@ pub fn algorithm(
     world: &World,
     threads: usize,
 ) -> Result<Box<dyn Algorithm>, Error> {
-    let team = Team {
-        spec: world.spec(),
-        prior: &world.prior(),
-        seed: config.run.seed,
-        threads,
-    };
-    config
-        .algorithm
-        .kind()
-        .build(config.algorithm.table(), team)
+    let (kind, table) = (config.algorithm.kind(), config.algorithm.table());
+    with_team(config, world, threads, |team| kind.build(table, team))
 }
 
 /// As [`algorithm`], with the weights of a finished run, which are a safetensors file.
@@ -90,9 +82,45 @@ pub fn trained(
     world: &World,
     weights: &[u8],
 ) -> Result<Box<dyn Algorithm>, Error> {
+    expect_room(config, world, weights)?;
     let mut algorithm = algorithm(config, world, 1)?;
     algorithm.load(&StoredWeights(weights))?;
     Ok(algorithm)
+}
+
+/// Refuses tensors that are too few for what the configuration describes, before room is made for that.
+///
+/// # Errors
+/// [`Error::Data`] if they are too few.
+pub(super) fn expect_room(config: &Config, world: &World, tensors: &[u8]) -> Result<(), Error> {
+    let expected = size(config, world)?.saturating_mul(size_of::<f32>());
+    if tensors.len() >= expected {
+        return Ok(());
+    }
+    Err(Error::Data(format!(
+        "weights have {} bytes, expected more than {expected} for the team that the configuration describes",
+        tensors.len()
+    )))
+}
+
+/// How many parameters the models of a configuration have.
+fn size(config: &Config, world: &World) -> Result<usize, Error> {
+    let (kind, table) = (config.algorithm.kind(), config.algorithm.table());
+    with_team(config, world, 1, |team| kind.size(table, team))
+}
+
+fn with_team<T>(
+    config: &Config,
+    world: &World,
+    threads: usize,
+    make: impl FnOnce(Team<'_>) -> T,
+) -> T {
+    make(Team {
+        spec: world.spec(),
+        prior: &world.prior(),
+        seed: config.run.seed,
+        threads,
+    })
 }
 
 /// Bytes that no file of weights or of a checkpoint's tensors exceeds in a run that `config` describes: a file that a stranger
@@ -106,8 +134,8 @@ pub fn tensors_bytes_max(config: &Config) -> Result<usize, Error> {
     const COPIES: usize = 4;
     let mut config = config.clone();
     config.env = config.env.simulated();
-    let algorithm = algorithm(&config, &World::new(&config)?, 1)?;
-    let models = algorithm.models();
-    let parameters: usize = models.iter().map(|(layout, _)| layout.len()).sum();
-    Ok(HEADER + COPIES * parameters * size_of::<f32>())
+    let parameters = size(&config, &World::new(&config)?)?;
+    Ok(parameters
+        .saturating_mul(COPIES * size_of::<f32>())
+        .saturating_add(HEADER))
 }

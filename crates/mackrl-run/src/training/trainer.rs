@@ -106,6 +106,7 @@ impl Trainer {
         threads: usize,
         checkpoint: &Checkpoint,
     ) -> Result<Self, Error> {
+        assembly::expect_room(config, world, &checkpoint.tensors)?;
         let mut algorithm = assembly::algorithm(config, world, threads)?;
         algorithm.load(&StoredWeights(&checkpoint.tensors))?;
         let mut trainer = Self::of(algorithm, config, world, threads)?;

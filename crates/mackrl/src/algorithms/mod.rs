@@ -142,6 +142,13 @@ pub trait AlgorithmKind: Send + Sync + Debug {
     /// [`Error::Config`] if the table is not one that [`check`](Self::check) accepts.
     fn build(&self, table: &toml::Table, team: Team<'_>) -> Result<Box<dyn Algorithm>, Error>;
 
+    /// How many numbers the [`models`](Algorithm::models) of such an algorithm have, without making room for them: both the table
+    /// and the file that is said to hold them may be a stranger's.
+    ///
+    /// # Errors
+    /// As [`build`](Self::build).
+    fn size(&self, table: &toml::Table, team: Team<'_>) -> Result<usize, Error>;
+
     /// Configurations that are shipped with it.
     fn presets(&self) -> &'static [Preset] {
         &[]

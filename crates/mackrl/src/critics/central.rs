@@ -117,6 +117,19 @@ impl CentralCritic {
         }
     }
 
+    /// How many parameters a critic for states of `state_size` numbers has.
+    #[must_use]
+    pub fn size(state_size: usize, hidden: usize) -> usize {
+        let sizes = NetworkSizes {
+            inputs: state_size,
+            hidden,
+            outputs: 1,
+        };
+        let mut layout = ParameterLayout::new();
+        FeedForward::new(&mut layout, super::CRITIC, sizes);
+        layout.len()
+    }
+
     /// Names and shapes of the parameters.
     #[must_use]
     pub const fn layout(&self) -> &ParameterLayout {

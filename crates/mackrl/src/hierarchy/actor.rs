@@ -113,7 +113,7 @@ impl Actor for TeamActor {
         for &b in situation.playing {
             self.observe(perspective, situation, b);
         }
-        self.stopwatch.lap(Phase::CommonKnowledge);
+        self.stopwatch.lap(Phase::Act);
         let moment = Moment {
             step: situation.step,
             playing: situation.playing,

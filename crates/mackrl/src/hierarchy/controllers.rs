@@ -123,7 +123,12 @@ impl Controllers {
         for level in 0..banks.len() {
             if let Some(weights) = &weights[level] {
                 self.write_rows(level, perspective, moment.playing, &mut banks[level]);
-                stopwatch.lap(Phase::CommonKnowledge);
+                let reads_own = level == parts.declaration.alone();
+                stopwatch.lap(if reads_own {
+                    Phase::Act
+                } else {
+                    Phase::CommonKnowledge
+                });
                 let bank = parts.banks[level]
                     .as_ref()
                     .expect("weights belong to a bank");

@@ -201,7 +201,11 @@ impl Declaration {
     ///
     /// # Errors
     /// [`Error::Config`] if there are more than 8 agents: ten have 1 575 divisions into fours.
-    pub fn fours([agents, actions]: [usize; 2], delegation: Delegation) -> Result<Self, Error> {
+    pub fn fours(
+        [agents, actions]: [usize; 2],
+        selection: Selection,
+        delegation: Delegation,
+    ) -> Result<Self, Error> {
         const SIZE: usize = 4;
         let most = PartitionSchedule::MOST_AGENTS_ENUMERATED;
         if agents == 0 || agents > most {
@@ -263,6 +267,7 @@ impl Declaration {
         };
         let mut team = team(agents, divisions);
         team.name = "four_selector";
+        team.selection = selection;
         let levels = vec![team, four, pairs(agents, 3, delegation), alone(agents)];
         Ok(Self::new([agents, actions], levels, None, false))
     }
@@ -501,7 +506,7 @@ mod tests {
         for agents in 1..=8 {
             for declaration in [
                 pairwise(agents).unwrap(),
-                Declaration::fours([agents, 3], Delegation::Learned).unwrap(),
+                Declaration::fours([agents, 3], Selection::Learned, Delegation::Learned).unwrap(),
                 Declaration::agents_alone([agents, 3]),
             ] {
                 for (place, level) in declaration.levels().iter().enumerate() {
@@ -529,7 +534,7 @@ mod tests {
 
     #[test]
     fn eight_agents_have_35_divisions_into_fours_and_each_four_has_three() {
-        let fours = Declaration::fours([8, 14], Delegation::Learned).unwrap();
+        let fours = Declaration::fours([8, 14], Selection::Learned, Delegation::Learned).unwrap();
         let levels = fours.levels();
         assert_eq!(
             levels
@@ -545,12 +550,13 @@ mod tests {
                 .collect::<Vec<_>>(),
             [35, 3, 1 + 14 * 14, 14]
         );
-        assert!(Declaration::fours([9, 2], Delegation::Learned).is_err());
+        assert!(Declaration::fours([9, 2], Selection::Learned, Delegation::Learned).is_err());
     }
 
     #[test]
     fn columns_count_divisions_first_and_then_joint_actions() {
-        let declaration = Declaration::fours([8, 14], Delegation::Learned).unwrap();
+        let declaration =
+            Declaration::fours([8, 14], Selection::Learned, Delegation::Learned).unwrap();
         let actions: Vec<Action> = (0..8).map(Action::new).collect();
         let [team, four, pair, agent] = declaration.levels() else {
             panic!("four levels");

@@ -102,7 +102,8 @@ impl Tables {
 
     /// Random policies for team → fours → pairs → agents. Some divisions are impossible.
     pub(crate) fn random_fours(seed: u64, agents: usize, actions: usize) -> Self {
-        let declaration = Declaration::fours([agents, actions], Delegation::Learned);
+        let declaration =
+            Declaration::fours([agents, actions], Selection::Learned, Delegation::Learned);
         let declaration = declaration.expect("a small team");
         let mut numbers = Numbers::new(seed);
         let [alone, pairs] = small_groups(&mut numbers, &declaration, PAIRS + 1);

@@ -130,6 +130,13 @@ impl ActorCritic {
         }
     }
 
+    /// How many parameters a team with this hierarchy and its critic have.
+    #[must_use]
+    pub fn size(hierarchy: &Hierarchy, settings: &ActorCriticSettings, team: Team<'_>) -> usize {
+        let critic = CentralCritic::size(team.spec.state_size, settings.hidden);
+        hierarchy.layout().len() + critic
+    }
+
     /// The critic.
     #[must_use]
     pub const fn critic(&self) -> &CentralCritic {

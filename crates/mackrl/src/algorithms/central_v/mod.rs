@@ -44,14 +44,25 @@ impl AlgorithmKind for CentralV {
     }
 
     fn build(&self, table: &toml::Table, team: Team<'_>) -> Result<Box<dyn Algorithm>, Error> {
-        let settings = ActorCriticSettings::read(table).map_err(Error::setting)?;
-        let declaration = Declaration::agents_alone([team.spec.agents, team.spec.actions]);
-        let own = HierarchySettings {
-            // No group reads it.
-            common_knowledge: CommonKnowledgeFeatures::default(),
-            hidden: settings.hidden,
-        };
-        let hierarchy = Hierarchy::new(declaration, team.spec, team.prior, own);
+        let (hierarchy, settings) = parts(table, team)?;
         Ok(Box::new(ActorCritic::new(hierarchy, settings, team)))
     }
+
+    fn size(&self, table: &toml::Table, team: Team<'_>) -> Result<usize, Error> {
+        let (hierarchy, settings) = parts(table, team)?;
+        Ok(ActorCritic::size(&hierarchy, &settings, team))
+    }
+}
+
+/// The hierarchy without upper levels, and how it learns.
+fn parts(table: &toml::Table, team: Team<'_>) -> Result<(Hierarchy, ActorCriticSettings), Error> {
+    let settings = ActorCriticSettings::read(table).map_err(Error::setting)?;
+    let declaration = Declaration::agents_alone([team.spec.agents, team.spec.actions]);
+    let own = HierarchySettings {
+        // No group reads it.
+        common_knowledge: CommonKnowledgeFeatures::default(),
+        hidden: settings.hidden,
+    };
+    let hierarchy = Hierarchy::new(declaration, team.spec, team.prior, own);
+    Ok((hierarchy, settings))
 }

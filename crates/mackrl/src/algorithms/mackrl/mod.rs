@@ -102,14 +102,13 @@ impl AlgorithmKind for Mackrl {
     }
 
     fn build(&self, table: &toml::Table, team: Team<'_>) -> Result<Box<dyn Algorithm>, Error> {
-        let (settings, learning) = Self::read(table).map_err(Error::setting)?;
-        let declaration = settings.declaration([team.spec.agents, team.spec.actions], team.seed)?;
-        let own = HierarchySettings {
-            common_knowledge: settings.common_knowledge,
-            hidden: learning.hidden,
-        };
-        let hierarchy = Hierarchy::new(declaration, team.spec, team.prior, own);
-        Ok(Box::new(ActorCritic::new(hierarchy, learning, team)))
+        let (hierarchy, settings) = parts(table, team)?;
+        Ok(Box::new(ActorCritic::new(hierarchy, settings, team)))
+    }
+
+    fn size(&self, table: &toml::Table, team: Team<'_>) -> Result<usize, Error> {
+        let (hierarchy, settings) = parts(table, team)?;
+        Ok(ActorCritic::size(&hierarchy, &settings, team))
     }
 
     fn presets(&self) -> &'static [Preset] {
@@ -132,4 +131,16 @@ impl AlgorithmKind for Mackrl {
             },
         ]
     }
+}
+
+/// The declared hierarchy, and how it learns.
+fn parts(table: &toml::Table, team: Team<'_>) -> Result<(Hierarchy, ActorCriticSettings), Error> {
+    let (settings, learning) = Mackrl::read(table).map_err(Error::setting)?;
+    let declaration = settings.declaration([team.spec.agents, team.spec.actions], team.seed)?;
+    let own = HierarchySettings {
+        common_knowledge: settings.common_knowledge,
+        hidden: learning.hidden,
+    };
+    let hierarchy = Hierarchy::new(declaration, team.spec, team.prior, own);
+    Ok((hierarchy, learning))
 }

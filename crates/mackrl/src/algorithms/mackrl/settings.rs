@@ -46,37 +46,25 @@ declare_settings! {
 }
 
 impl MackrlSettings {
-    /// Checks what fours ask of a team and of the other settings.
+    /// Checks what fours ask of a team.
     pub(super) fn check_fours(
         &self,
         table: &toml::Table,
         spec: &EnvironmentSpec,
     ) -> Result<toml::Table, SettingsError> {
         let most = PartitionSchedule::MOST_AGENTS_ENUMERATED;
-        let wrong = |name: &str, found: String, expected: String| {
-            SettingsError::Wrong(WrongSetting {
-                name: name.to_owned(),
-                found,
-                expected,
-                nearest: None,
-            })
-        };
-        if spec.agents > most {
-            let expected = format!(
+        if spec.agents <= most {
+            return Ok(table.clone());
+        }
+        Err(SettingsError::Wrong(WrongSetting {
+            name: "levels".to_owned(),
+            found: "\"fours\"".to_owned(),
+            expected: format!(
                 "\"pairs\" for the {} agents of {}: only teams of at most {most} divide into fours",
                 spec.agents, spec.name
-            );
-            return Err(wrong("levels", "\"fours\"".to_owned(), expected));
-        }
-        if self.selector != Selection::Learned {
-            let expected = "\"learned\" where algorithm.levels is \"fours\"".to_owned();
-            return Err(wrong(
-                "selector",
-                format!("\"{}\"", self.selector.word()),
-                expected,
-            ));
-        }
-        Ok(table.clone())
+            ),
+            nearest: None,
+        }))
     }
 
     /// The hierarchy of a team of N agents with A actions each; sampled partitions are drawn from `seed`.
@@ -89,7 +77,7 @@ impl MackrlSettings {
                 let schedule = self.partitions.into();
                 Declaration::pairwise(team, schedule, self.selector, self.delegation, seed)
             }
-            Levels::Fours => Declaration::fours(team, self.delegation),
+            Levels::Fours => Declaration::fours(team, self.selector, self.delegation),
         }
     }
 }
