@@ -45,6 +45,13 @@ pub(crate) enum Failure {
     /// A team that does not run decentralised.
     #[error("not decentralised: {mismatches} actions differ from the central run")]
     CertificateFailed { mismatches: u64 },
+    /// Quantities in which the simulator is not the game.
+    #[error("the simulator differs from the real game in {failed} of {rows} quantities")]
+    Unfaithful {
+        failed: usize,
+        /// How many were compared.
+        rows: usize,
+    },
     /// A recorded episode that does not play as it did.
     #[error("{message}")]
     ReplayDiffers { message: String },
@@ -148,7 +155,9 @@ fn of_failure(failure: &Failure) -> Verdict {
     let (exit, hint) = match failure {
         Failure::Usage { .. } => (Exit::Usage, None),
         Failure::BadData { .. } => (Exit::Data, None),
-        Failure::Different { .. } | Failure::CertificateFailed { .. } => (Exit::Differs, None),
+        Failure::Different { .. }
+        | Failure::CertificateFailed { .. }
+        | Failure::Unfaithful { .. } => (Exit::Differs, None),
         Failure::OtherVersions { .. } => (
             Exit::Usage,
             Some("take them together as they are with --any-code, or choose another folder with --out".to_owned()),

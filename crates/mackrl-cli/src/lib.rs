@@ -65,6 +65,7 @@ pub fn run(registry: Registry) -> ExitCode {
         Command::Report(args) => commands::report::run(&args),
         Command::Reproduce(args) => commands::reproduce::run(&args),
         Command::Play(args) => commands::play::run(&args),
+        Command::Fidelity(args) => commands::fidelity::run(&args),
         Command::Replay(args) => commands::replay::run(&args),
         Command::Explain(args) => commands::explain::run(&args),
         Command::Serve(args) => commands::serve::run(&args),

@@ -3,6 +3,7 @@
 mod analysis;
 mod bench;
 mod configuration;
+mod fidelity;
 mod inquiry;
 mod play;
 mod replay;
@@ -30,6 +31,7 @@ pub(crate) use bench::{
     BenchArgs, BenchCommand, BenchEnvironmentArgs, BenchTrainArgs, BenchUpdateArgs,
 };
 pub(crate) use configuration::{ConfigurationArgs, world};
+pub(crate) use fidelity::FidelityArgs;
 pub(crate) use inquiry::DiffArgs;
 pub(crate) use play::PlayArgs;
 pub(crate) use replay::{ExplainArgs, ReplayArgs};
@@ -80,6 +82,7 @@ pub(crate) enum Command {
     Report(ReportArgs),
     Reproduce(ReproduceArgs),
     Play(PlayArgs),
+    Fidelity(FidelityArgs),
     Replay(ReplayArgs),
     Explain(ExplainArgs),
     Serve(ServeRunsArgs),

@@ -9,6 +9,7 @@ pub(crate) mod diff;
 pub(crate) mod evaluate;
 pub(crate) mod execute_agent;
 pub(crate) mod explain;
+pub(crate) mod fidelity;
 pub(crate) mod maps;
 pub(crate) mod play;
 pub(crate) mod plot;

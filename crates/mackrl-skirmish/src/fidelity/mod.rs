@@ -17,7 +17,7 @@ mod sample;
 pub use checks::{Finding, judge, passed};
 pub use distribution::{QUANTILES, Spread};
 pub use policy::Policy;
-pub use reference::{Quantity, Reference, References, Source};
+pub use reference::{Lengths, Quantity, Reference, References, Source};
 pub use sample::{Played, Sample, play};
 
 #[cfg(test)]
