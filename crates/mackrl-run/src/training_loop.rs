@@ -16,7 +16,7 @@ use crate::{
     provenance::{Provenance, Versions},
     run_folder::{Resumption, RunFolder, Status},
     stop_request::StopRequest,
-    training::{Checkpoint, MetricRow, Trainer, assembly::World},
+    training::{Checkpoint, MetricRow, Trainer, assembly::RunWorld},
 };
 
 /// How a run stands.
@@ -70,7 +70,7 @@ pub struct Summary {
 pub fn train(
     path: &Path,
     config: &Config,
-    world: &World,
+    world: &RunWorld,
     threads: usize,
     stop: &StopRequest,
     observer: &mut dyn Observer,
@@ -89,7 +89,7 @@ pub fn train(
 /// [`RunError::Interrupted`] when asked to stop; otherwise what went wrong.
 pub fn resume(
     path: &Path,
-    world: impl FnOnce(&Config) -> Result<World, mackrl::Error>,
+    world: impl FnOnce(&Config) -> Result<RunWorld, mackrl::Error>,
     threads: usize,
     stop: &StopRequest,
     observer: &mut dyn Observer,

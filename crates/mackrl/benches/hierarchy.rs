@@ -21,7 +21,7 @@ use mackrl::{
 use mackrl_env::{Action, Environment, EpisodeKey, Observations, Stream};
 use mackrl_run::{
     config::Config,
-    training::assembly::{self, World},
+    training::assembly::{self, RunWorld},
 };
 
 /// Environments of a shard in training.
@@ -111,7 +111,7 @@ impl Scene {
             "algorithm.partitions=round-robin",
         ];
         let config = Config::with(&settings).expect("a map of this program");
-        let world = World::new(&config).expect("a world of this program");
+        let world = RunWorld::new(&config).expect("a world of this program");
         let team = assembly::algorithm(&config, &world, 1).expect("a team of this program");
         let environments = world.environments(ENVIRONMENTS);
         let agents = world.spec().agents;

@@ -13,7 +13,7 @@ use mackrl::{
 use mackrl_env::{EpisodeKey, Stream};
 use mackrl_run::{
     config::Config,
-    training::assembly::{self, World},
+    training::assembly::{self, RunWorld},
 };
 
 const STEPS: usize = 60;
@@ -40,7 +40,7 @@ struct Lesson {
 impl Lesson {
     fn new() -> Self {
         let config = Config::default();
-        let world = World::new(&config).expect("3m is a map of this program");
+        let world = RunWorld::new(&config).expect("3m is a map of this program");
         let team = assembly::algorithm(&config, &world, 1).expect("as above");
         let environments = world.environments(ENVIRONMENTS);
         let collector = Collector::new(team.policy(), environments, SHARDS, 1);

@@ -8,12 +8,12 @@ use mackrl::{
 use mackrl_env::{Action, AgentId, EpisodeKey, Observations, Stream};
 use mackrl_run::{
     config::Config,
-    training::assembly::{self, World},
+    training::assembly::{self, RunWorld},
 };
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let config = Config::with(&["env.map=3m"])?;
-    let world = World::new(&config)?;
+    let world = RunWorld::new(&config)?;
     let team = assembly::algorithm(&config, &world, 1)?;
     let (policy, parameters) = (team.policy(), team.parameters());
     let behaviour = Behaviour::sampled(0.1);

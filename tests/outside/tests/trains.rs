@@ -8,7 +8,7 @@ use mackrl_run::{
     config::{Config, ConfigBuilder, Registry},
     training::{
         Trainer,
-        assembly::{self, World},
+        assembly::{self, RunWorld},
     },
 };
 use outside::ReinforceKind;
@@ -45,7 +45,7 @@ fn an_algorithm_of_another_crate_learns_in_a_run() {
 #[test]
 fn it_goes_on_from_a_checkpoint_to_the_byte() {
     let config = config(&["algorithm.environments=3"]);
-    let world = World::new(&config).expect("a world");
+    let world = RunWorld::new(&config).expect("a world");
     let mut whole = Trainer::new(&config, 1).expect("a run");
     for _ in 0..7 {
         whole.update().expect("numbers are finite");
@@ -66,7 +66,7 @@ fn its_agents_alone_do_what_the_central_run_does() {
     for _ in 0..20 {
         trainer.update().expect("numbers are finite");
     }
-    let world = World::new(&config).expect("a world");
+    let world = RunWorld::new(&config).expect("a world");
     let algorithm = assembly::trained(&config, &world, &trainer.weights()).expect("its weights");
     let mut links: Vec<Box<dyn AgentLink + '_>> = (0..world.spec().agents)
         .map(|agent| {

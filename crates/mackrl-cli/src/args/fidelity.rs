@@ -8,16 +8,18 @@ use crate::args::runs::ThreadsArgs;
 
 /// Compare the simulator with recorded runs of the real StarCraft II, quantity by quantity
 ///
-/// Training logs of hundreds of runs on the real game are public. Their first episodes are random play, and the first tests of an
-/// untrained network repeat one action; this command plays the same policies in the simulator and sets every quantity beside
-/// the recorded one, with its tolerance. Policies: `random`; `stop`, which stands and never shoots; `attack-K`, which attacks
-/// enemy K whenever it can and stands otherwise.
+/// Training logs of hundreds of runs on the real game are public. Their first episodes are random
+/// play, and the first tests of an untrained network repeat one action; this command plays the same
+/// policies in the simulator and sets every quantity beside the recorded one, with its tolerance.
+/// Policies: `random`; `stop`, which stands and never shoots; `attack-K`, which attacks enemy K
+/// whenever it can and stands otherwise.
 ///
-/// Rows belong to numbered checks, and a check passes if all of its rows do. Rows about trained teams are not played here: they
-/// are printed as open, and neither pass nor fail. Rules were chosen by the rows marked `fitted`; the others test them.
+/// Rows belong to numbered checks, and a check passes if all of its rows do. Rows about trained
+/// teams are not played here: they are printed as open, and neither pass nor fail. Rules were
+/// chosen by the rows marked `fitted`; the others test them.
 ///
-/// Exit code: 0 if every row that was played passes, 1 if one does not. All numbers follow from --set and --episodes alone; the
-/// number of threads changes none.
+/// Exit code: 0 if every row that was played passes, 1 if one does not. All numbers follow from
+/// --set and --episodes alone; the number of threads changes none.
 ///
 /// Examples:
 ///   mackrl fidelity

@@ -6,7 +6,7 @@ use mackrl::decentralised::serve_agent;
 use mackrl_env::AgentId;
 use mackrl_run::{
     run_folder::Run,
-    training::assembly::{self, World},
+    training::assembly::{self, RunWorld},
 };
 
 use crate::{args::ExecuteAgentArgs, failure::Failure};
@@ -20,7 +20,7 @@ pub(crate) fn run(args: &ExecuteAgentArgs) -> anyhow::Result<()> {
     // An agent needs to know its world; it does not play in it.
     let mut config = run.config.clone();
     config.env = config.env.simulated();
-    let world = World::new(&config)?;
+    let world = RunWorld::new(&config)?;
     let agents = world.spec().agents;
     if args.agent >= agents {
         let message = format!("--agent is {}, expected less than {agents}", args.agent);

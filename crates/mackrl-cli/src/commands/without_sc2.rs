@@ -19,8 +19,8 @@ use crate::{
 const MISSING: &str = "this program was built without StarCraft II: build it on Linux with the feature `sc2`, which is on by default";
 
 /// The world that a run is played in.
-pub(crate) fn world(config: &Config) -> Result<assembly::World, Error> {
-    assembly::World::of(world_of(&config.env)?)
+pub(crate) fn world(config: &Config) -> Result<assembly::RunWorld, Error> {
+    assembly::RunWorld::of(world_of(&config.env)?)
 }
 
 /// The world that `map` describes.

@@ -189,7 +189,7 @@ impl Target for Weights {
 
     fn read(&mut self, input: &[u8]) -> Result<(), String> {
         let layout = self.layout.get_or_insert_with(|| {
-            let world = assembly::World::new(&small()).expect("a shipped map");
+            let world = assembly::RunWorld::new(&small()).expect("a shipped map");
             let team = assembly::algorithm(&small(), &world, 1).expect("a small team");
             team.policy().layout().clone()
         });

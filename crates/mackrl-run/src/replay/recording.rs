@@ -15,7 +15,7 @@ use mackrl_skirmish::{
 use super::{Player, Replay, STEPS_MOST, Step, hexadecimal};
 use crate::{
     config::{Config, EnvironmentConfig},
-    training::assembly::{self, World},
+    training::assembly::{self, RunWorld},
 };
 
 /// Plays the episode `key` by a script.
@@ -87,7 +87,7 @@ impl Watched {
         behaviour: Behaviour,
         key: EpisodeKey,
     ) -> Result<Self, Error> {
-        let algorithm = assembly::trained(config, &World::new(config)?, weights)?;
+        let algorithm = assembly::trained(config, &RunWorld::new(config)?, weights)?;
         let mut actor = algorithm.policy().actor(1);
         let mut experience = Experience::default();
         actor.begin(Recording::Off, &mut experience);

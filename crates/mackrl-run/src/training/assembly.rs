@@ -13,11 +13,11 @@ use crate::config::Config;
 
 /// The world of a run, from which its environments are made.
 #[derive(Debug, Clone)]
-pub struct World {
+pub struct RunWorld {
     world: Arc<dyn mackrl_env::World>,
 }
 
-impl World {
+impl RunWorld {
     /// Reads the configuration's `env` section, for worlds that its kind builds.
     ///
     /// # Errors
@@ -66,7 +66,7 @@ impl World {
 /// [`Error::Config`] if the team is too large for the chosen partitions.
 pub fn algorithm(
     config: &Config,
-    world: &World,
+    world: &RunWorld,
     threads: usize,
 ) -> Result<Box<dyn Algorithm>, Error> {
     let (kind, table) = (config.algorithm.kind(), config.algorithm.table());
@@ -79,7 +79,7 @@ pub fn algorithm(
 /// As [`algorithm`], and [`Error::Data`] if the weights are not those of such a team.
 pub fn trained(
     config: &Config,
-    world: &World,
+    world: &RunWorld,
     weights: &[u8],
 ) -> Result<Box<dyn Algorithm>, Error> {
     expect_room(config, world, weights)?;
@@ -92,7 +92,7 @@ pub fn trained(
 ///
 /// # Errors
 /// [`Error::Data`] if they are too few.
-pub(super) fn expect_room(config: &Config, world: &World, tensors: &[u8]) -> Result<(), Error> {
+pub(super) fn expect_room(config: &Config, world: &RunWorld, tensors: &[u8]) -> Result<(), Error> {
     let expected = size(config, world)?.saturating_mul(size_of::<f32>());
     if tensors.len() >= expected {
         return Ok(());
@@ -104,14 +104,14 @@ pub(super) fn expect_room(config: &Config, world: &World, tensors: &[u8]) -> Res
 }
 
 /// How many parameters the models of a configuration have.
-fn size(config: &Config, world: &World) -> Result<usize, Error> {
+fn size(config: &Config, world: &RunWorld) -> Result<usize, Error> {
     let (kind, table) = (config.algorithm.kind(), config.algorithm.table());
     with_team(config, world, 1, |team| kind.size(table, team))
 }
 
 fn with_team<T>(
     config: &Config,
-    world: &World,
+    world: &RunWorld,
     threads: usize,
     make: impl FnOnce(Team<'_>) -> T,
 ) -> T {
@@ -127,14 +127,14 @@ fn with_team<T>(
 /// wrote needs to be read no further.
 ///
 /// # Errors
-/// As [`World::new`] and [`algorithm`].
+/// As [`RunWorld::new`] and [`algorithm`].
 pub fn tensors_bytes_max(config: &Config) -> Result<usize, Error> {
     const HEADER: usize = 1 << 20;
     /// Parameters, a target copy and two moments.
     const COPIES: usize = 4;
     let mut config = config.clone();
     config.env = config.env.simulated();
-    let parameters = size(&config, &World::new(&config)?)?;
+    let parameters = size(&config, &RunWorld::new(&config)?)?;
     Ok(parameters
         .saturating_mul(COPIES * size_of::<f32>())
         .saturating_add(HEADER))

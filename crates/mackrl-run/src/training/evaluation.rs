@@ -87,7 +87,7 @@ pub fn evaluate(
     threads: usize,
 ) -> Result<Evaluation, Error> {
     evaluate_in(
-        &assembly::World::new(config)?,
+        &assembly::RunWorld::new(config)?,
         config,
         weights,
         Episodes {
@@ -112,7 +112,7 @@ pub struct Episodes {
 /// # Errors
 /// As [`evaluate`], and [`Error::Step`] if the world cannot be played in any more.
 pub fn evaluate_in(
-    world: &assembly::World,
+    world: &assembly::RunWorld,
     config: &Config,
     weights: &[u8],
     episodes: Episodes,
@@ -136,7 +136,7 @@ impl Evaluator {
     /// Room for playing some of `episodes` episodes at once.
     pub(super) fn new(
         policy: &dyn Policy,
-        world: &assembly::World,
+        world: &assembly::RunWorld,
         episodes: usize,
         threads: usize,
     ) -> Self {

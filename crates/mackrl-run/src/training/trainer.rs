@@ -23,7 +23,7 @@ use crate::config::Config;
 /// Trains one team.
 pub struct Trainer {
     config: Config,
-    world: assembly::World,
+    world: assembly::RunWorld,
     algorithm: Box<dyn Algorithm>,
     collector: Collector,
     evaluator: Evaluator,
@@ -53,7 +53,7 @@ impl Trainer {
     /// # Errors
     /// [`Error::Config`] if the configuration describes nothing that can be trained.
     pub fn new(config: &Config, threads: usize) -> Result<Self, Error> {
-        Self::in_world(config, &assembly::World::new(config)?, threads)
+        Self::in_world(config, &assembly::RunWorld::new(config)?, threads)
     }
 
     /// As [`Trainer::new`], in a world that need not be the built-in simulator's.
@@ -62,7 +62,7 @@ impl Trainer {
     /// As [`Trainer::new`].
     pub fn in_world(
         config: &Config,
-        world: &assembly::World,
+        world: &assembly::RunWorld,
         threads: usize,
     ) -> Result<Self, Error> {
         let algorithm = assembly::algorithm(config, world, threads)?;
@@ -73,7 +73,7 @@ impl Trainer {
     fn of(
         algorithm: Box<dyn Algorithm>,
         config: &Config,
-        world: &assembly::World,
+        world: &assembly::RunWorld,
         threads: usize,
     ) -> Result<Self, Error> {
         let (policy, shards) = (algorithm.policy(), algorithm.shards());
@@ -102,7 +102,7 @@ impl Trainer {
     /// As [`Self::in_world`] and [`Self::restore`].
     pub fn resumed(
         config: &Config,
-        world: &assembly::World,
+        world: &assembly::RunWorld,
         threads: usize,
         checkpoint: &Checkpoint,
     ) -> Result<Self, Error> {

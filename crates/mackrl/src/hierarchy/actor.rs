@@ -6,7 +6,7 @@ use mackrl_env::{Action, AgentId, EntityId};
 
 use super::{
     Parts,
-    controllers::{Controllers, Moment, rows_of_environment},
+    controllers::{Controllers, StepContext, rows_of_environment},
     evaluation::add_entries,
     perspective::{Perspective, forced_action},
     statistics::HierarchyStatistics,
@@ -114,7 +114,7 @@ impl Actor for TeamActor {
             self.observe(perspective, situation, b);
         }
         self.stopwatch.lap(Phase::Act);
-        let moment = Moment {
+        let moment = StepContext {
             step: situation.step,
             playing: situation.playing,
             exploration: situation.behaviour.exploration,

@@ -37,7 +37,7 @@ pub(crate) struct Controllers {
 
 /// When and where a step is taken.
 #[derive(Clone, Copy)]
-pub(crate) struct Moment<'a> {
+pub(crate) struct StepContext<'a> {
     pub(crate) step: usize,
     /// The environments that are still playing, ascending.
     pub(crate) playing: &'a [usize],
@@ -110,7 +110,7 @@ impl Controllers {
         &mut self,
         parameters: &Parameters,
         perspective: Perspective<'_>,
-        moment: Moment<'_>,
+        moment: StepContext<'_>,
         banks: &mut [Rows],
         stopwatch: &mut Stopwatch,
     ) -> Result<(), NotFinite> {

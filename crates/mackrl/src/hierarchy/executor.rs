@@ -11,7 +11,7 @@ use mackrl_env::{Action, AgentId, EpisodeKey, LocalView};
 
 use super::{
     Parts,
-    controllers::{Controllers, Moment},
+    controllers::{Controllers, StepContext},
     perspective::{Perspective, forced_action, is_alive},
 };
 use crate::{
@@ -63,7 +63,7 @@ impl Executor for AgentExecutor {
             return forced_action(view);
         }
         let parts = Arc::clone(&self.controllers.parts);
-        let moment = Moment {
+        let moment = StepContext {
             step,
             playing: &[0],
             exploration: behaviour.exploration,

@@ -30,7 +30,7 @@ pub enum Choice {
 
 /// A possible outcome of Algorithm 1.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Path {
+pub struct WeightedPath {
     /// p(path | s): the product of the probabilities of all choices on the path.
     pub probability: f64,
     /// The joint action in which the path ends.
@@ -71,11 +71,11 @@ impl Controller {
 
     /// Every path through this controller and those below it.
     #[must_use]
-    pub fn paths(&self) -> Vec<Path> {
+    pub fn paths(&self) -> Vec<WeightedPath> {
         self.choices
             .iter()
             .flat_map(|(probability, choice)| {
-                choice.paths().into_iter().map(move |path| Path {
+                choice.paths().into_iter().map(move |path| WeightedPath {
                     probability: probability * path.probability,
                     assignment: path.assignment,
                 })
@@ -141,14 +141,14 @@ fn joint_action(members: &[AgentId], actions: usize, mut number: usize) -> Assig
 
 impl Choice {
     /// Every path below this choice: one for a joint action, all combinations of the parts' paths for a partition.
-    fn paths(&self) -> Vec<Path> {
+    fn paths(&self) -> Vec<WeightedPath> {
         match self {
-            Self::Act(assignment) => vec![Path {
+            Self::Act(assignment) => vec![WeightedPath {
                 probability: 1.0,
                 assignment: assignment.clone(),
             }],
             Self::Divide(parts) => {
-                let nothing = Path {
+                let nothing = WeightedPath {
                     probability: 1.0,
                     assignment: Assignment::new(),
                 };
@@ -164,7 +164,7 @@ impl Choice {
     }
 }
 
-impl Path {
+impl WeightedPath {
     /// Both paths, taken by disjoint groups that choose independently.
     fn then(&self, other: &Self) -> Self {
         Self {

@@ -8,7 +8,7 @@ use mackrl::{
     policy::{Behaviour, Declaration, Parameters, Policy, Recording},
 };
 use mackrl_env::{EpisodeKey, Stream, settings::Settings};
-use mackrl_run::{config::Config, training::assembly::World};
+use mackrl_run::{config::Config, training::assembly::RunWorld};
 
 /// From which initial parameters and sampled partitions follow.
 const SEED: u64 = 3;
@@ -31,13 +31,13 @@ pub(crate) fn world_setting(map: &str) -> String {
 }
 
 /// The world of the configuration with these settings.
-pub(crate) fn world(settings: &[&str]) -> World {
-    World::new(&config(settings)).expect("a world that can be built")
+pub(crate) fn world(settings: &[&str]) -> RunWorld {
+    RunWorld::new(&config(settings)).expect("a world that can be built")
 }
 
 /// A hierarchy and the worlds it plays in.
 pub(crate) struct Team {
-    pub(crate) world: World,
+    pub(crate) world: RunWorld,
     pub(crate) hierarchy: Hierarchy,
 }
 
@@ -78,7 +78,7 @@ impl Team {
         )
     }
 
-    fn declared(world: World, declaration: Declaration, networks: HierarchySettings) -> Self {
+    fn declared(world: RunWorld, declaration: Declaration, networks: HierarchySettings) -> Self {
         let hierarchy = Hierarchy::new(declaration, world.spec(), &world.prior(), networks);
         Self { world, hierarchy }
     }

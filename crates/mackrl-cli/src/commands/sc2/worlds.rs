@@ -15,16 +15,16 @@ use mackrl_skirmish::{EnemyBehaviour, Scenario, SkirmishSettings, unit_types::Un
 const PARALLEL_GAMES: usize = 8;
 
 /// The world that a run is played in.
-pub(crate) fn world(config: &Config) -> Result<assembly::World, Error> {
+pub(crate) fn world(config: &Config) -> Result<assembly::RunWorld, Error> {
     if !config.env.is_star_craft() {
-        return assembly::World::new(config);
+        return assembly::RunWorld::new(config);
     }
     let environments = config.algorithm.get("environments");
     let parallel_max = environments
         .and_then(toml::Value::as_integer)
         .and_then(|count| usize::try_from(count).ok());
     let parallel_max = parallel_max.unwrap_or(PARALLEL_GAMES);
-    assembly::World::of(Arc::new(StarCraftWorld::new(&config.env, parallel_max)?))
+    assembly::RunWorld::of(Arc::new(StarCraftWorld::new(&config.env, parallel_max)?))
 }
 
 /// The world that `map` describes.
