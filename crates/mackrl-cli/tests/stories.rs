@@ -72,6 +72,7 @@ fn help_teaches_every_command() {
         "reproduce ablations",
         "reproduce all",
         "play",
+        "fidelity",
         "replay",
         "explain",
         "serve",
