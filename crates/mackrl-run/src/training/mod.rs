@@ -1,4 +1,4 @@
-//! The training loop: rollout, learner, tests and metrics.
+//! The training loop: episodes, what learns from them, tests and metrics.
 //!
 //! This is the one place where a configuration becomes objects and where worlds, policies and learners meet. A run is a
 //! function of its configuration alone: the number of threads changes no result, and only metrics under `sys/` depend on the
