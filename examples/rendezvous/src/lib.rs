@@ -28,7 +28,7 @@ declare_settings! {
         /// Cells that a robot sees in each direction.
         sight: i32 = 1, Accepts::integer(1, 64);
         /// What a press alone costs.
-        penalty: f32 = 0.3, Accepts::within(0.0, 100.0);
+        penalty: f32 = 0.25, Accepts::within(0.0, 100.0);
         /// Steps of an episode.
         steps: usize = 20, Accepts::integer(1, 1000);
     }

@@ -24,9 +24,10 @@ pub(crate) struct PlotArgs {
     #[arg(short, long, value_name = "FILE")]
     pub(crate) out: PathBuf,
 
-    /// What is drawn: a name from metrics.jsonl
-    #[arg(long, value_name = "NAME", default_value = "test_battle_won_mean")]
-    pub(crate) metric: String,
+    /// What is drawn: a name from metrics.jsonl [default: what the world calls success, in greedy
+    /// tests: battles won on maps; the return where it calls nothing so]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) metric: Option<String>,
 
     /// What it is drawn over
     #[arg(long, value_name = "AXIS", default_value = "steps")]
@@ -90,9 +91,10 @@ pub(crate) struct ReportArgs {
     #[command(flatten)]
     pub(crate) runs: RunsArgs,
 
-    /// What is judged: a name from metrics.jsonl
-    #[arg(long, value_name = "NAME", default_value = "test_battle_won_mean")]
-    pub(crate) metric: String,
+    /// What is judged: a name from metrics.jsonl [default: what the world calls success, in greedy
+    /// tests: battles won on maps; the return where it calls nothing so]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) metric: Option<String>,
 
     /// Score runs by their curve at this number of environment steps
     #[arg(long, value_name = "N")]

@@ -39,3 +39,11 @@ fn note_left_out(grouping: &Grouping) {
         );
     }
 }
+
+/// The metric to show: the one that was asked for, or the one that says best how well a team plays in the world of the runs.
+fn headline_or(asked: Option<&String>, grouping: &Grouping) -> String {
+    let first = || grouping.series.first()?.runs.first();
+    (asked.cloned())
+        .or_else(|| Some(first()?.headline()))
+        .unwrap_or_else(|| "test_return_mean".to_owned())
+}

@@ -9,7 +9,7 @@ use mackrl_run::{
 };
 use serde::Serialize;
 
-use super::note_left_out;
+use super::{headline_or, note_left_out};
 use crate::{
     args::{CurveAxis, CurveStatistic, PlotArgs},
     failure::Failure,
@@ -37,8 +37,9 @@ pub(crate) fn run(args: &PlotArgs) -> anyhow::Result<()> {
     let grouping = group(find(&args.runs.paths)?, &args.runs.selection())?;
     note_left_out(&grouping);
     let map = only_map(&grouping)?;
-    let series = curves(&grouping, args)?;
-    let chart = chart(args, map, &series);
+    let metric = headline_or(args.metric.as_ref(), &grouping);
+    let series = curves(&grouping, args, &metric)?;
+    let chart = chart(args, &metric, map, &series);
     let picture = match format {
         Format::Svg => chart.to_svg().into_bytes(),
         Format::Png => chart.to_png()?,
@@ -59,11 +60,12 @@ pub(crate) fn run(args: &PlotArgs) -> anyhow::Result<()> {
 fn curves(
     grouping: &Grouping,
     args: &PlotArgs,
+    metric: &str,
 ) -> anyhow::Result<Vec<(String, usize, Vec<Point>)>> {
     let mut curves = Vec::new();
     let mut missing = None;
     for series in &grouping.series {
-        match Gridded::read(series, &args.metric, args.x.recorded()) {
+        match Gridded::read(series, metric, args.x.recorded()) {
             Ok(gridded) => {
                 let points = points(&gridded, args.statistic);
                 curves.push((series.name.clone(), series.runs.len(), points));
@@ -140,12 +142,17 @@ fn points(gridded: &Gridded, statistic: CurveStatistic) -> Vec<Point> {
     places.map(point).collect()
 }
 
-fn chart(args: &PlotArgs, map: &str, drawn: &[(String, usize, Vec<Point>)]) -> LineChart {
+fn chart(
+    args: &PlotArgs,
+    metric: &str,
+    map: &str,
+    drawn: &[(String, usize, Vec<Point>)],
+) -> LineChart {
     let is_share = ["battle_won_mean", "delegation_rate", "knowledge_rate"]
         .iter()
-        .any(|share| args.metric.contains(share));
+        .any(|share| metric.contains(share));
     let y_range = is_share.then_some([-0.02, 1.02]);
-    let label = match args.metric.as_str() {
+    let label = match metric {
         "test_battle_won_mean" => "Share of battles won in greedy tests".to_owned(),
         metric => metric.to_owned(),
     };
@@ -158,13 +165,10 @@ fn chart(args: &PlotArgs, map: &str, drawn: &[(String, usize, Vec<Point>)]) -> L
         })
         .collect();
     LineChart {
-        title: args
-            .title
-            .clone()
-            .unwrap_or_else(|| match args.metric.as_str() {
-                "test_battle_won_mean" => format!("Battles won on {map}"),
-                metric => format!("{metric} on {map}"),
-            }),
+        title: args.title.clone().unwrap_or_else(|| match metric {
+            "test_battle_won_mean" => format!("Battles won on {map}"),
+            metric => format!("{metric} on {map}"),
+        }),
         subtitle: match args.statistic {
             CurveStatistic::Mean => "Mean over runs, band ± one standard error",
             CurveStatistic::Iqm => "Interquartile mean over runs, band 95 % bootstrap interval",

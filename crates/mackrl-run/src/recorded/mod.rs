@@ -18,6 +18,7 @@ use crate::{
     error::{Context, Result},
     provenance::Provenance,
     run_folder::{self, Status},
+    training::headline,
 };
 pub use curve::{Axis, Measurements, final_mean, share_of};
 pub use find::find;
@@ -75,6 +76,16 @@ impl RecordedRun {
             kept: Some(run),
             path,
         })
+    }
+
+    /// The metric that says best how well a team plays in its world; see [`headline`].
+    #[must_use]
+    pub fn headline(&self) -> String {
+        let world = self.config.env.world();
+        world.map_or_else(
+            |_| "test_return_mean".to_owned(),
+            |world| headline(world.spec()),
+        )
     }
 
     /// Name of what learns, as configurations have it.

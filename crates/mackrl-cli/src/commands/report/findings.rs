@@ -79,7 +79,12 @@ pub(super) struct Comparison {
 
 impl Findings {
     /// Computes everything.
-    pub(super) fn new(scores: &Scores, args: &ReportArgs, provenance: Vec<Provenance>) -> Self {
+    pub(super) fn new(
+        scores: &Scores,
+        metric: String,
+        args: &ReportArgs,
+        provenance: Vec<Provenance>,
+    ) -> Self {
         let bootstrap = Bootstrap {
             resamples: usize::try_from(args.resamples).unwrap_or(usize::MAX),
             ..Bootstrap::default()
@@ -90,7 +95,7 @@ impl Findings {
         );
         let several = scores.maps.len() > 1;
         Self {
-            metric: args.metric.clone(),
+            metric,
             score,
             confidence: bootstrap.confidence,
             resamples: bootstrap.resamples,
