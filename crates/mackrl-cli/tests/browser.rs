@@ -322,6 +322,10 @@ fn served_runs_are_drawn_with_their_replays() {
     );
     let plots = dom.matches("<section class=\"plot\">").count();
     assert!(plots >= 6, "{plots} plots");
+    for controllers in ["pair selector", "pair controller", "agent controller"] {
+        let title = format!("<h2>Entropy: {controllers} (nats)</h2>");
+        assert!(dom.contains(&title), "the entropy of {controllers}: {dom}");
+    }
     assert!(
         page.contains("<h1 id=\"title\">3m by mackrl, greedy</h1>"),
         "the replay's page"
