@@ -6,10 +6,7 @@
 use clap::Args;
 use mackrl_run::config::Config;
 
-use super::{
-    ClaimSource,
-    learning::{Arm, Curves, Figure, LearningOptions, Rule, Score, Statement},
-};
+use super::learning::{Arm, Curves, Figure, LearningOptions, Rule, Score, Statement};
 
 /// Show where MACKRL's gain comes from: one plot of nine learners that differ in one thing each.
 ///
@@ -112,17 +109,14 @@ pub(crate) static FIGURE: Figure = Figure {
     claims: &[
         Statement {
             claim: "A team that always delegates learns as Central-V does",
-            source: ClaimSource::Reproduction,
-            map: 0,
             rule: Rule::Equal(["always-delegate", "central-v"]),
             remark: "Both start from weights of their own, so single runs differ.",
+            ..Statement::OURS
         },
         Statement {
             claim: "The gain comes from acting jointly: a team that always delegates ends lower than MACKRL",
-            source: ClaimSource::Reproduction,
-            map: 0,
             rule: Rule::Ahead(Score::Last, ["mackrl", "always-delegate"]),
-            remark: "",
+            ..Statement::OURS
         },
     ],
 };
@@ -156,7 +150,7 @@ mod tests {
                 })
             })
             .collect();
-        FIGURE.report("paper", Some("2s3z"), &runs)
+        FIGURE.report(Some("2s3z"), &runs)
     }
 
     fn compared(report: &Report) -> &[Variant] {

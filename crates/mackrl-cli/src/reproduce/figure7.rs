@@ -6,8 +6,8 @@
 use clap::Args;
 
 use super::{
-    ClaimSource, figure6,
-    learning::{Curves, Figure, LearningOptions, PublishedMoment, Rule, Statement},
+    figure6,
+    learning::{Curves, Figure, LearningOptions, Rule, Statement},
 };
 
 /// Reproduce Figure 7: how often pairs delegate, by how many enemies they commonly know, on 2s3z.
@@ -32,22 +32,10 @@ pub(crate) static FIGURE: Figure = Figure {
     maps: &["2s3z"],
     arms: |_| vec![figure6::MACKRL],
     curves: Curves::Moments(&[
-        PublishedMoment {
-            steps: 0,
-            rates: &[0.046, 0.047, 0.034, 0.032, 0.031, 0.023],
-        },
-        PublishedMoment {
-            steps: 500_000,
-            rates: &[0.093, 0.391, 0.149, 0.030, 0.003, 0.002],
-        },
-        PublishedMoment {
-            steps: 1_200_000,
-            rates: &[0.158, 0.680, 0.176, 0.033, 0.000, 0.001],
-        },
-        PublishedMoment {
-            steps: 1_600_000,
-            rates: &[0.137, 0.636, 0.932, 0.229, 0.002, 0.001],
-        },
+        (0, [0.046, 0.047, 0.034, 0.032, 0.031, 0.023]),
+        (500_000, [0.093, 0.391, 0.149, 0.030, 0.003, 0.002]),
+        (1_200_000, [0.158, 0.680, 0.176, 0.033, 0.000, 0.001]),
+        (1_600_000, [0.137, 0.636, 0.932, 0.229, 0.002, 0.001]),
     ]),
     heading: "Figure 7, share of chosen pairs that delegate on 2s3z, by commonly known enemies: mean of {seeds} seeds",
     title: "Delegation by commonly known enemies, 2s3z",
@@ -59,36 +47,30 @@ pub(crate) static FIGURE: Figure = Figure {
     claims: &[
         Statement {
             claim: "At the beginning of training, the pair controller delegates only rarely",
-            source: ClaimSource::Paper,
-            map: 0,
             rule: Rule::Delegates {
                 moment: 0,
                 enemies: &[0, 1, 2, 3, 4, 5],
                 rule: (|rate| rate < 0.1, "less than 0.1 of each"),
             },
-            remark: "",
+            ..Statement::PAPER
         },
         Statement {
             claim: "Later it delegates in most situations in which few enemies are commonly known",
-            source: ClaimSource::Paper,
-            map: 0,
             rule: Rule::Delegates {
                 moment: 3,
                 enemies: &[1, 2],
                 rule: (|rate| rate >= 0.5, "at least 0.5 of each"),
             },
-            remark: "",
+            ..Statement::PAPER
         },
         Statement {
             claim: "Later it coordinates where common knowledge is substantial",
-            source: ClaimSource::Paper,
-            map: 0,
             rule: Rule::Delegates {
                 moment: 3,
                 enemies: &[4, 5],
                 rule: (|rate| rate < 0.05, "less than 0.05 of each"),
             },
-            remark: "",
+            ..Statement::PAPER
         },
     ],
 };

@@ -1,8 +1,8 @@
 //! The charts of a figure.
 
 use super::{
-    Body, Report,
-    report::{Moment, Panel, Variant},
+    Body, Curve, Report,
+    report::{Moment, Panel, Rate, Variant},
 };
 use crate::{
     plot::{Axis, Colour, Corner, LineChart, Mark, Multiple, Point, Series, SmallMultiples},
@@ -76,11 +76,8 @@ impl Report {
         let Some((mackrl, others)) = variants.split_first() else {
             unreachable!("a report begins with MACKRL");
         };
-        let series = |variant: &Variant, name: &str, colour| Series {
-            name: Some(name.to_owned()),
-            colour,
-            mark: Mark::Line,
-            points: variant.curve.points(&self.steps),
+        let series = |variant: &Variant, name: &str, colour| {
+            line(name.to_owned(), colour, variant.curve.points(&self.steps))
         };
         let panel = |variant: &Variant| Multiple {
             title: variant.arm.label.to_owned(),
@@ -105,11 +102,12 @@ impl Report {
 
 /// Our curves on a map, and the published points up to the last step that is shown.
 fn win_rates(panel: &Panel, steps: &[u64]) -> Vec<Series> {
-    let learned = |name: &str, colour, curve: &super::Curve| Series {
-        name: Some(format!("{name} ({})", curve.runs)),
-        colour,
-        mark: Mark::Line,
-        points: curve.points(steps),
+    let learned = |name: &str, colour, curve: &Curve| {
+        line(
+            format!("{name} ({})", curve.runs),
+            colour,
+            curve.points(steps),
+        )
     };
     let last = steps.last().copied().unwrap_or(0);
     let published = panel.published;
@@ -143,16 +141,19 @@ fn emptiest_corner(panel: &Panel) -> Corner {
 }
 
 fn rates((moment, colour): (&Moment, Colour)) -> Series {
-    let rates = moment.rates.iter().enumerate();
+    let point = |(enemies, rate): (usize, &Rate)| {
+        Some(Point::with_error(enemies as f64, rate.mean?, rate.sem?))
+    };
+    let points = moment.rates.iter().enumerate().filter_map(point);
+    line(moment.when(), colour, points.collect())
+}
+
+fn line(name: String, colour: Colour, points: Vec<Point>) -> Series {
     Series {
-        name: Some(moment.when()),
+        name: Some(name),
         colour,
         mark: Mark::Line,
-        points: rates
-            .filter_map(|(enemies, rate)| {
-                Some(Point::with_error(enemies as f64, rate.mean?, rate.sem?))
-            })
-            .collect(),
+        points,
     }
 }
 

@@ -120,30 +120,19 @@ impl Figure {
             .build()?;
         let arms = (self.arms)(&preset);
         let maps = map.map_or_else(|| self.maps.to_vec(), |map| vec![map]);
-        let on = |map: &str| {
-            let map = map.to_owned();
-            let cell = |&arm| Cell {
-                map: map.clone(),
-                arm,
-            };
-            arms.iter().map(cell).collect::<Vec<_>>()
+        let on = |map: &str, arm: Arm| Cell {
+            map: map.to_owned(),
+            arm,
         };
-        Ok(maps.into_iter().flat_map(on).collect())
+        Ok((maps.iter())
+            .flat_map(|map| arms.iter().map(move |&arm| on(map, arm)))
+            .collect())
     }
 
     /// The report of runs of which each cell has as many.
     #[cfg(test)]
-    pub(crate) fn report(
-        &'static self,
-        preset: &str,
-        map: Option<&str>,
-        runs: &[TrainingRun],
-    ) -> Report {
-        let preset = preset.to_owned();
-        let options = LearningOptions {
-            preset,
-            ..LearningOptions::default()
-        };
+    pub(crate) fn report(&'static self, map: Option<&str>, runs: &[TrainingRun]) -> Report {
+        let options = LearningOptions::default();
         let cells = self.cells(&options, map).unwrap();
         Report::new(self, &options, map, &cells, runs)
     }

@@ -84,14 +84,8 @@ pub(crate) struct Moment {
     pub(crate) published: &'static [f64],
 }
 
-/// Published delegation.
-#[derive(Debug)]
-pub(crate) struct PublishedMoment {
-    /// Environment steps, of 2.5 million.
-    pub(crate) steps: u64,
-    /// Rates by the number of commonly known enemies, from 0.
-    pub(crate) rates: &'static [f64],
-}
+/// Published delegation: environment steps, of 2.5 million, and the rates by the number of commonly known enemies, from 0.
+pub(crate) type PublishedMoment = (u64, [f64; 6]);
 
 /// A delegation rate over seeds.
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -210,17 +204,17 @@ impl Body {
 
 impl Moment {
     fn new(
-        published: &'static PublishedMoment,
+        (steps, published): &'static PublishedMoment,
         runs: &[TrainingRun],
         options: &LearningOptions,
     ) -> Self {
-        let interval = interval_at(published.steps as f64 / PUBLISHED_LENGTH, options);
+        let interval = interval_at(*steps as f64 / PUBLISHED_LENGTH, options);
         Self {
             steps: (interval as u64 * options.interval).min(options.steps),
-            rates: (0..published.rates.len())
+            rates: (0..published.len())
                 .map(|enemies| Rate::new(runs, interval, enemies))
                 .collect(),
-            published: published.rates,
+            published,
         }
     }
 

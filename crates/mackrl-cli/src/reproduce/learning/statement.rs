@@ -95,6 +95,20 @@ impl Score {
 }
 
 impl Statement {
+    /// What the paper claims is laid over this: a first map, and no remark.
+    pub(crate) const PAPER: Self = Self {
+        claim: "",
+        source: ClaimSource::Paper,
+        map: 0,
+        rule: Rule::Apart,
+        remark: "",
+    };
+    /// The same for what this project claims.
+    pub(crate) const OURS: Self = Self {
+        source: ClaimSource::Reproduction,
+        ..Self::PAPER
+    };
+
     /// The verdict.
     pub(super) fn judge(&self, groups: &[Group<'_>], body: &Body) -> Claim {
         let (holds, evidence) = self.rule.apply(|names| self.arms(names, groups), body);
