@@ -12,13 +12,14 @@ use crate::{
 };
 
 pub(crate) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
-    match &args.figure {
-        Figure::Figure5(options) => figure5(options),
-        Figure::Figure6(options) => print(&figure6::run(options)?, options.learning.json),
-        Figure::Figure7(options) => print(&figure7::run(options)?, options.learning.json),
-        Figure::Ablations(options) => print(&ablations::run(options)?, options.learning.json),
-        Figure::All(options) => print(&all::run(options)?, options.learning.json),
-    }
+    let (figure, options, map) = match &args.figure {
+        Figure::Figure5(options) => return figure5(options),
+        Figure::Figure6(options) => (&figure6::FIGURE, &options.learning, None),
+        Figure::Figure7(options) => (&figure7::FIGURE, &options.learning, None),
+        Figure::Ablations(options) => (&ablations::FIGURE, &options.learning, Some(&*options.map)),
+        Figure::All(options) => return print(&all::run(options)?, options.learning.json),
+    };
+    print(&figure.run(options, map)?, options.json)
 }
 
 fn figure5(options: &figure5::Figure5Options) -> anyhow::Result<()> {

@@ -32,7 +32,7 @@ pub(crate) enum ClaimSource {
 
 impl Claim {
     /// Writes the verdict, the claim and the evidence, wrapped.
-    pub(crate) fn write(&self, out: &mut Formatter<'_>) -> Result {
+    fn write(&self, out: &mut Formatter<'_>) -> Result {
         let verdict = if self.holds {
             "holds        "
         } else {
@@ -53,6 +53,12 @@ impl Claim {
         }
         Ok(())
     }
+}
+
+/// Writes all verdicts, below a heading.
+pub(crate) fn write_verdicts(out: &mut Formatter<'_>, claims: &[Claim]) -> Result {
+    writeln!(out, "Verdicts")?;
+    claims.iter().try_for_each(|claim| claim.write(out))
 }
 
 /// Breaks `text` at spaces into lines of at most `columns` characters, unless a word is longer.

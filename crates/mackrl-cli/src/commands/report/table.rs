@@ -1,9 +1,9 @@
 //! A report as text.
 
-use mackrl::statistics::{Crossings, Interval};
+use mackrl::statistics::Crossings;
 
 use super::findings::{Averages, Comparison, Findings, MapFindings};
-use crate::output;
+use crate::{output, reproduce::interval};
 
 /// The report as it reads.
 pub(super) fn text(findings: &Findings) -> String {
@@ -98,15 +98,6 @@ fn comparisons(comparisons: &[Comparison]) -> Vec<Vec<String>> {
 
 fn averages(averages: &Averages) -> [String; 3] {
     [averages.interquartile_mean, averages.median, averages.mean].map(interval)
-}
-
-fn interval(interval: Interval) -> String {
-    let Interval {
-        estimate,
-        low,
-        high,
-    } = interval;
-    format!("{estimate:.3} [{low:.3}, {high:.3}]")
 }
 
 fn steps(crossings: &Crossings) -> String {

@@ -4,31 +4,27 @@ mod page;
 
 use std::{
     fmt::{self, Display, Formatter},
-    fs,
+    iter,
     path::PathBuf,
 };
 
-use anyhow::Context as _;
 use clap::{Args, Command, FromArgMatches as _};
 use serde::Serialize;
 
 use super::{
-    Claim, ablations,
-    ablations::{AblationOptions, AblationReport},
-    figure5,
+    Claim, ablations, figure5,
     figure5::{Figure5Options, Figure5Report},
-    figure6,
-    figure6::{Figure6Options, Figure6Report},
-    figure7,
-    figure7::{Figure7Options, Figure7Report},
-    learning::LearningOptions,
-    write,
+    figure6, figure7,
+    learning::{LearningOptions, Report},
+    make_folder, write,
 };
-use crate::{plot::LineChart, progress::Meter};
+use crate::progress::Meter;
 use page::Section;
 
 /// The page's name.
 const PAGE: &str = "report.html";
+/// Above the section of the matrix game.
+const FIGURE5: &str = "Figure 5: the matrix game";
 
 /// Reproduce all figures and the ablations, and make one self-contained HTML report of them.
 ///
@@ -50,16 +46,16 @@ pub(crate) struct AllOptions {
 }
 
 /// Everything in numbers.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct AllReport {
     /// Where the page lies.
     pub(crate) page: PathBuf,
     /// Repeats these numbers.
     pub(crate) command: String,
     pub(crate) figure5: Figure5Report,
-    pub(crate) figure6: Figure6Report,
-    pub(crate) figure7: Figure7Report,
-    pub(crate) ablations: Option<AblationReport>,
+    pub(crate) figure6: Report,
+    pub(crate) figure7: Report,
+    pub(crate) ablations: Option<Report>,
 }
 
 /// Makes everything that is not there and writes the page.
@@ -69,25 +65,16 @@ pub(crate) struct AllReport {
 pub(crate) fn run(options: &AllOptions) -> anyhow::Result<AllReport> {
     let learning = &options.learning;
     let out = &learning.out;
-    fs::create_dir_all(out).with_context(|| format!("creating the folder {}", out.display()))?;
+    make_folder(out)?;
     let meter = Meter::new("runs of figure 5");
     let figure5 = figure5::run(&figure5_options(out)?, &|done, total| {
         meter.report(done, total);
     })?;
-    let figure6 = figure6::run(&Figure6Options {
-        learning: learning.clone(),
-    })?;
-    let figure7 = figure7::run(&Figure7Options {
-        learning: learning.clone(),
-    })?;
-    let ablations = if options.without_ablations {
-        None
-    } else {
-        Some(ablations::run(&AblationOptions {
-            learning: learning.clone(),
-            map: "2s3z".to_owned(),
-        })?)
-    };
+    let figure6 = figure6::FIGURE.run(learning, None)?;
+    let figure7 = figure7::FIGURE.run(learning, None)?;
+    let ablations = (!options.without_ablations)
+        .then(|| ablations::FIGURE.run(learning, Some("2s3z")))
+        .transpose()?;
     let mut command = learning.resolved().command("all");
     if options.without_ablations {
         command += " --without-ablations";
@@ -113,53 +100,49 @@ fn figure5_options(out: &std::path::Path) -> anyhow::Result<Figure5Options> {
 }
 
 impl AllReport {
-    /// Every claim, with the figure that it is about.
-    fn claims(&self) -> Vec<(&'static str, &Claim)> {
-        let ablations = self.ablations.as_ref();
-        let ablations: &[Claim] = ablations.map_or(&[], |report| &report.claims);
+    /// The figures of learning.
+    fn learning(&self) -> impl Iterator<Item = &Report> {
         [
-            ("Figure 5", &*self.figure5.claims),
-            ("Figure 6", &self.figure6.claims),
-            ("Figure 7", &self.figure7.claims),
-            ("Ablations", ablations),
+            Some(&self.figure6),
+            Some(&self.figure7),
+            self.ablations.as_ref(),
         ]
         .into_iter()
-        .flat_map(|(figure, claims)| claims.iter().map(move |claim| (figure, claim)))
-        .collect()
+        .flatten()
+    }
+
+    /// Every claim, with the figure that it is about.
+    fn claims(&self) -> Vec<(&'static str, &Claim)> {
+        let learning = self
+            .learning()
+            .map(|report| (report.figure.section, &report.claims));
+        iter::once((FIGURE5, &self.figure5.claims))
+            .chain(learning)
+            .flat_map(|(section, claims)| {
+                let figure = section
+                    .split_once(':')
+                    .map_or(section, |(figure, _)| figure);
+                claims.iter().map(move |claim| (figure, claim))
+            })
+            .collect()
     }
 
     fn html(&self) -> anyhow::Result<String> {
-        let provenance = |value: serde_json::Result<String>| value.context("writing a provenance");
-        let mut sections = vec![
-            Section {
-                title: "Figure 5: the matrix game",
-                charts: vec![self.figure5.chart().to_svg()],
-                claims: &self.figure5.claims,
-                text: self.figure5.to_string(),
-                provenance: provenance(serde_json::to_string_pretty(&self.figure5.provenance))?,
-            },
-            Section {
-                title: "Figure 6: battles won during training",
-                charts: (self.figure6.charts().iter().map(LineChart::to_svg)).collect(),
-                claims: &self.figure6.claims,
-                text: self.figure6.to_string(),
-                provenance: provenance(serde_json::to_string_pretty(&self.figure6.provenance))?,
-            },
-            Section {
-                title: "Figure 7: when pairs delegate",
-                charts: vec![self.figure7.chart().to_svg()],
-                claims: &self.figure7.claims,
-                text: self.figure7.to_string(),
-                provenance: provenance(serde_json::to_string_pretty(&self.figure7.provenance))?,
-            },
-        ];
-        if let Some(ablations) = &self.ablations {
+        let figure5 = &self.figure5;
+        let mut sections = vec![Section {
+            title: FIGURE5,
+            charts: vec![figure5.chart().to_svg()],
+            claims: &figure5.claims,
+            text: figure5.to_string(),
+            provenance: serde_json::to_string_pretty(&figure5.provenance)?,
+        }];
+        for report in self.learning() {
             sections.push(Section {
-                title: "Ablations: where the gain comes from",
-                charts: vec![ablations.chart().to_svg()],
-                claims: &ablations.claims,
-                text: ablations.to_string(),
-                provenance: provenance(serde_json::to_string_pretty(&ablations.provenance))?,
+                title: report.figure.section,
+                charts: (report.charts().iter().map(|(_, chart)| chart.to_svg())).collect(),
+                claims: &report.claims,
+                text: report.to_string(),
+                provenance: serde_json::to_string_pretty(&report.provenance)?,
             });
         }
         Ok(page::html(&self.command, &self.claims(), &sections))

@@ -12,9 +12,6 @@ mod published;
 mod report;
 mod table;
 
-use std::fs;
-
-use anyhow::Context as _;
 use mackrl::tabular::{Learner, SweepSettings, TabularGame, optima, sweep};
 
 pub(crate) use options::Figure5Options;
@@ -23,8 +20,7 @@ pub(crate) use report::Figure5Report;
 use findings::Findings;
 use report::Delegation;
 
-use super::write;
-use crate::plot::LineChart;
+use super::{Chart, make_folder, save};
 
 /// Probabilities of common knowledge, as published.
 fn points() -> Vec<f64> {
@@ -33,7 +29,7 @@ fn points() -> Vec<f64> {
 
 /// Runs everything and writes `figure5.svg`, `figure5.png` and `figure5.json` into the folder that `options` names.
 ///
-/// `progress` hears how many runs of how many are finished, from any thread. The files are the same bytes for any number of
+/// `progress` is told how many runs of how many are finished, from any thread. The files are the same bytes for any number of
 /// threads.
 ///
 /// # Errors
@@ -42,22 +38,17 @@ pub(crate) fn run(
     options: &Figure5Options,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> anyhow::Result<Figure5Report> {
-    // A folder that cannot be written should be found out before the work, not after it.
-    fs::create_dir_all(&options.out)
-        .with_context(|| format!("creating the folder {}", options.out.display()))?;
+    make_folder(&options.out)?;
     let report = compute(options, progress)?;
-    let chart = report.chart();
-    let json = serde_json::to_string_pretty(&report).context("writing the report as JSON")? + "\n";
-    write(&options.out, "figure5.json", json.as_bytes())?;
-    write(&options.out, "figure5.svg", chart.to_svg().as_bytes())?;
-    write(&options.out, "figure5.png", &chart.to_png()?)?;
+    let charts = [("figure5".to_owned(), report.chart())];
+    save(&options.out, "figure5", &report, &charts)?;
     Ok(report)
 }
 
 impl Figure5Report {
     /// The figure.
-    pub(crate) fn chart(&self) -> LineChart {
-        chart::chart(self)
+    pub(crate) fn chart(&self) -> Chart {
+        Chart::Lines(chart::chart(self))
     }
 }
 

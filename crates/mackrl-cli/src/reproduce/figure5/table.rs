@@ -2,12 +2,13 @@
 
 use std::fmt::{Display, Formatter, Result};
 
-use mackrl::tabular::{Curve, Learner};
+use mackrl::tabular::Learner;
 
 use super::{
     findings::name,
     report::{Figure5Report, Quantity, StateDelegation},
 };
+use crate::reproduce::{entry, number, write_verdicts};
 
 impl Display for Figure5Report {
     fn fmt(&self, out: &mut Formatter<'_>) -> Result {
@@ -23,8 +24,7 @@ impl Display for Figure5Report {
         writeln!(out, "{}\n", self.command)?;
         self.write_curves(out)?;
         self.write_delegation(out)?;
-        writeln!(out, "Verdicts")?;
-        self.claims.iter().try_for_each(|claim| claim.write(out))
+        write_verdicts(out, &self.claims)
     }
 }
 
@@ -49,7 +49,11 @@ impl Figure5Report {
             write!(out, "{p:>4.1}")?;
             for (learner, curve) in learners {
                 let published = number(self.published.at(learner, p));
-                write!(out, "   {:<13} {published:>9}", entry(curve, point))?;
+                write!(
+                    out,
+                    "   {:<13} {published:>9}",
+                    entry(curve.mean[point], curve.sem[point])
+                )?;
             }
             let (mackrl, jal) = (self.optimum.mackrl[point], self.optimum.jal[point]);
             writeln!(out, "   {mackrl:>11.3} {jal:>6.3}")?;
@@ -83,12 +87,4 @@ impl Figure5Report {
         }
         writeln!(out)
     }
-}
-
-fn entry(curve: &Curve, point: usize) -> String {
-    format!("{:.3} ± {:.3}", curve.mean[point], curve.sem[point])
-}
-
-fn number(value: Option<f64>) -> String {
-    value.map_or_else(|| "–".into(), |value| format!("{value:.3}"))
 }

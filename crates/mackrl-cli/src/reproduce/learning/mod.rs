@@ -1,4 +1,7 @@
-//! Training runs for the figures that show learning: many seeds, each learner with the same settings.
+//! The figures that show learning, as data.
+//!
+//! A [`Figure`] says what to train, what to draw, what was published and what is claimed. One engine makes the runs of any of them, and
+//! one [`Report`] has its numbers, its charts, its table and its verdicts, so that a figure is a value and not a module of code.
 //!
 //! The runs are made as those of a sweep: each has a process and a run folder of its own, below `training/` in the folder of the
 //! figure, and goes on where it was if it was stopped. What the figures need of a finished run is kept beside it in a small file in
@@ -6,90 +9,131 @@
 //! thread each, because many runs side by side use a machine better than one run on all of it, and because their number of
 //! threads changes no result.
 
+mod chart;
 mod curve;
 mod options;
-mod run;
+mod report;
+mod statement;
+mod table;
+mod train;
 
-use std::collections::BTreeSet;
+use mackrl_run::config::{Config, ConfigBuilder};
+#[cfg(test)]
+use mackrl_run::recorded::TrainingRun;
+use serde::Serialize;
 
-use mackrl_run::{provenance::Versions, recorded::TrainingRun, sweep::Entry};
-
-use crate::{commands::resume::make_all, failure::Failure, signals};
+use super::{make_folder, save};
 pub(crate) use curve::{Curve, Difference};
 pub(crate) use options::LearningOptions;
-pub(crate) use run::{Job, Learner};
-
-/// Makes all `jobs` that were not made before, as many side by side as `options` says, and gives their runs in the order of
-/// the jobs.
-///
-/// # Errors
-/// [`Failure::SweepInterrupted`] when asked to stop; [`Failure::BadData`] if a run failed, after all others are made.
-pub(crate) fn train_all(
-    jobs: &[Job],
-    options: &LearningOptions,
-) -> anyhow::Result<Vec<TrainingRun>> {
-    let mut runs: Vec<Option<TrainingRun>> = (jobs.iter())
-        .map(|job| job.load(options))
-        .collect::<anyhow::Result<_>>()?;
-    let missing: Vec<usize> = (0..jobs.len()).filter(|&job| runs[job].is_none()).collect();
-    if !options.any_code {
-        check_versions(&runs)?;
-    }
-    let entries: Vec<Entry> = (missing.iter())
-        .map(|&job| jobs[job].entry(options))
-        .collect::<anyhow::Result<_>>()?;
-    let outcome = make_all(&entries, options.jobs(), &signals::listen()?)?;
-    if let Some((name, reason)) = outcome.failed.first() {
-        let message = format!(
-            "{} of {} runs failed, the first of them {name}: {reason}",
-            outcome.failed.len(),
-            entries.len()
-        );
-        return Err(Failure::BadData { message }.into());
-    }
-    for (job, entry) in missing.into_iter().zip(&entries) {
-        runs[job] = Some(jobs[job].keep(entry, options)?);
-    }
-    Ok(runs.into_iter().flatten().collect())
-}
-
-/// Refuses runs of which some were computed by other versions than the rest, or than this program if runs are still to be made.
-///
-/// # Errors
-/// [`Failure::OtherVersions`], with both.
-fn check_versions(runs: &[Option<TrainingRun>]) -> Result<(), Failure> {
-    let versions = |run: &Option<TrainingRun>| {
-        run.as_ref()
-            .map_or(Versions::OWN, |run| run.provenance().versions)
-    };
-    let versions: BTreeSet<Versions> = runs.iter().map(versions).collect();
-    let mut versions = versions.into_iter();
-    match (versions.next(), versions.next()) {
-        (Some(one), Some(other)) => Err(Failure::OtherVersions { one, other }),
-        _ => Ok(()),
-    }
-}
-
 #[cfg(test)]
-mod tests {
-    use mackrl_run::config::Config;
+pub(crate) use report::Variant;
+pub(crate) use report::{Body, Published, PublishedMoment, Report};
+pub(crate) use statement::{Rule, Score, Statement};
+use train::{Job, train_all};
 
-    use super::*;
+/// A figure of learning. In its texts, `{map}` and `{seeds}` stand for the map and the number of seeds.
+#[derive(Debug)]
+pub(crate) struct Figure {
+    /// Its command, with which the names of its files begin.
+    pub(crate) name: &'static str,
+    /// Above its section of the page of all figures: what it is, a colon, what it shows.
+    pub(crate) section: &'static str,
+    /// Maps to learn on, unless another is asked for.
+    pub(crate) maps: &'static [&'static str],
+    /// Who learns on each of them, for a preset.
+    pub(crate) arms: fn(&Config) -> Vec<Arm>,
+    /// What the curves are.
+    pub(crate) curves: Curves,
+    /// First line of its table.
+    pub(crate) heading: &'static str,
+    /// Above its charts.
+    pub(crate) title: &'static str,
+    /// Below the title.
+    pub(crate) subtitle: &'static str,
+    /// Below and beside its charts.
+    pub(crate) axes: [&'static str; 2],
+    /// What is claimed.
+    pub(crate) claims: &'static [Statement],
+}
 
-    #[test]
-    fn runs_of_other_versions_are_drawn_alone_and_not_mixed() {
-        let own = TrainingRun::new(&Config::default(), vec![0.5], Vec::new());
-        let mut old = serde_json::to_value(&own).unwrap();
-        old["provenance"]["versions"]["learning"] = 1.into();
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("old.json");
-        std::fs::write(&file, old.to_string()).unwrap();
-        let old = TrainingRun::load(&file).unwrap();
-        assert!(check_versions(&[Some(old.clone()), Some(old.clone())]).is_ok());
-        assert!(check_versions(&[Some(own.clone()), None]).is_ok());
-        for other in [Some(own), None] {
-            let error = check_versions(&[Some(old.clone()), other]).unwrap_err();
-            assert!(error.to_string().contains("learning 1 and "), "{error}");
-        }
+/// What a figure shows of its runs.
+#[derive(Debug)]
+pub(crate) enum Curves {
+    /// Win rates of MACKRL and Central-V, the first two arms, in a chart for each map, beside what was published for it.
+    Maps(&'static [Published]),
+    /// How often pairs delegate, by the enemies they commonly know, at the moments at which that was published.
+    Moments(&'static [PublishedMoment]),
+    /// Win rates of each arm against those of the first, in a panel for each.
+    Variants,
+}
+
+/// Some settings laid over a preset.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub(crate) struct Arm {
+    /// In names of files.
+    pub(crate) name: &'static str,
+    /// In the legend.
+    pub(crate) label: &'static str,
+    /// What is laid over the preset.
+    pub(crate) settings: &'static [&'static str],
+    /// What the comparison with MACKRL tells.
+    pub(crate) question: &'static str,
+}
+
+/// An arm on a map, of which there is a run for each seed.
+#[derive(Debug, Clone)]
+pub(crate) struct Cell {
+    map: String,
+    arm: Arm,
+}
+
+impl Figure {
+    /// Makes all runs that are not there and writes the figure into the folder that `options` names; on `map`, if one is asked for.
+    ///
+    /// # Errors
+    /// If a run fails or a file cannot be written.
+    pub(crate) fn run(
+        &'static self,
+        options: &LearningOptions,
+        map: Option<&str>,
+    ) -> anyhow::Result<Report> {
+        let options = options.resolved();
+        make_folder(&options.out)?;
+        let cells = self.cells(&options, map)?;
+        let jobs: Vec<Job<'_>> = (cells.iter())
+            .flat_map(|cell| (1..=options.seeds).map(move |seed| Job { cell, seed }))
+            .collect();
+        let runs = train_all(&jobs, &options)?;
+        let report = Report::new(self, &options, map, &cells, &runs);
+        save(&options.out, self.name, &report, &report.charts())?;
+        Ok(report)
+    }
+
+    /// Maps, then arms: the order of the runs.
+    pub(crate) fn cells(
+        &self,
+        options: &LearningOptions,
+        map: Option<&str>,
+    ) -> anyhow::Result<Vec<Cell>> {
+        let preset = ConfigBuilder::new(crate::registry())
+            .preset(&options.preset)?
+            .build()?;
+        let arms = (self.arms)(&preset);
+        let maps = map.map_or_else(|| self.maps.to_vec(), |map| vec![map]);
+        let on = |map: &str, arm: Arm| Cell {
+            map: map.to_owned(),
+            arm,
+        };
+        Ok((maps.iter())
+            .flat_map(|map| arms.iter().map(move |&arm| on(map, arm)))
+            .collect())
+    }
+
+    /// The report of runs of which each cell has as many.
+    #[cfg(test)]
+    pub(crate) fn report(&'static self, map: Option<&str>, runs: &[TrainingRun]) -> Report {
+        let options = LearningOptions::default();
+        let cells = self.cells(&options, map).unwrap();
+        Report::new(self, &options, map, &cells, runs)
     }
 }
