@@ -33,15 +33,19 @@ fn hash_of_sources() -> Option<String> {
     for (folder, package, place) in SOURCES {
         let version = env!("CARGO_PKG_VERSION");
         let beside = [format!("../{folder}"), format!("../{package}-{version}")];
-        let root =
-            (beside.iter().map(|name| Path::new(name).join(place))).find(|path| path.exists())?;
+        let roots = beside.map(|name| Path::new(&name).join(place));
+        let Some(root) = roots.iter().find(|path| path.exists()) else {
+            // What is missing now may be there at the next build.
+            println!("cargo::rerun-if-changed={}", roots[0].display());
+            return None;
+        };
         println!("cargo::rerun-if-changed={}", root.display());
         let mut files = Vec::new();
-        collect(&root, &mut files);
+        collect(root, &mut files);
         files.sort();
         for file in files {
             let content = fs::read(&file).expect("a source file can be read");
-            let name = file.strip_prefix(&root).expect("a file of the folder");
+            let name = file.strip_prefix(root).expect("a file of the folder");
             hasher.update(format!(
                 "{folder}/{place}/{}",
                 name.to_string_lossy().replace('\\', "/")

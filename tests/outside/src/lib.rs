@@ -3,6 +3,10 @@
 //! It uses what any other crate can use, and neither the hierarchy nor the networks of `mackrl`: an own [`Policy`] with an own
 //! [`Actor`] and [`Executor`], an own [`Algorithm`] that learns from an [`Experience`], and an own [`AlgorithmKind`] with
 //! settings, help and checkpoints.
+//!
+//! [`Actor`]: mackrl::policy::Actor
+//! [`Executor`]: mackrl::policy::Executor
+//! [`Experience`]: mackrl::experience::Experience
 
 mod learner;
 mod policy;

@@ -1,6 +1,6 @@
 //! Execution by one agent alone, and the certificate that it equals the central run.
 //!
-//! Training is central; what it yields must not be. An [`Executor`](crate::policy::Executor) is one agent with the weights, the shared seed and its own
+//! Training is central; what it yields must not be. An [`Executor`] is one agent with the weights, the shared seed and its own
 //! local views, and nothing else. [`Subject::certify`] plays whole episodes with N executors beside the central run and compares
 //! every action, and plays the central run again in worlds where everything that an agent does not see is different.
 

@@ -11,8 +11,8 @@
 //! of partition or of delegation is never an input of a later step: p(u) marginalises over it, and a policy that depends on
 //! the path would make that marginal's gradient biased (Table 1 of the paper lists it; the authors' code has none either).
 //!
-//! A [`Hierarchy`] is any [`Declaration`] with its networks. [`Controllers`](controllers) run its levels from a
-//! [perspective], that of all agents or of one alone; [`evaluation`] gives log p(u) of an experience and turns a gradient with
+//! A [`Hierarchy`] is any [`Declaration`] with its networks. `controllers` run its levels from a
+//! `perspective`, that of all agents or of one alone; `evaluation` gives log p(u) of an experience and turns a gradient with
 //! respect to it into one of the parameters.
 
 mod activations;
