@@ -229,35 +229,27 @@ impl<'a> Draft<'a> {
 
     /// The keys that could have been meant by `path`.
     fn known_keys(&self, path: &[&str]) -> Vec<String> {
-        let in_table = |settings: Vec<Setting>| {
-            let table = format!("{}.{}", path[0], path[1]);
-            let keys = settings.into_iter();
-            keys.map(move |setting| format!("{table}.{}", setting.name))
+        let keys = |table: &str, settings: &[Setting]| -> Vec<String> {
+            let keys = settings.iter();
+            keys.map(|setting| format!("{table}.{}", setting.name))
                 .collect()
         };
-        match *path {
-            ["env", kind, _] if let Some(kind) = self.registry.world(kind) => {
-                in_table(kind.settings())
-            }
-            ["algorithm", kind, _] if let Some(kind) = self.registry.algorithm(kind) => {
-                in_table(kind.settings())
-            }
-            _ => {
-                let of = |section: &'static str, settings: &[Setting]| -> Vec<String> {
-                    let keys = settings.iter();
-                    keys.map(|setting| format!("{section}.{}", setting.name))
-                        .collect()
-                };
-                [
-                    vec!["env.name".to_owned(), "algorithm.name".to_owned()],
-                    of("env", &self.env.kind.declared()),
-                    of("algorithm", &self.algorithm.kind.declared()),
-                    of("test", TestConfig::SETTINGS),
-                    of("run", RunConfig::SETTINGS),
-                ]
-                .concat()
-            }
+        let in_table = match *path {
+            ["env", kind, _] => self.registry.world(kind).map(|kind| kind.settings()),
+            ["algorithm", kind, _] => self.registry.algorithm(kind).map(|kind| kind.settings()),
+            _ => None,
+        };
+        if let Some(settings) = in_table {
+            return keys(&format!("{}.{}", path[0], path[1]), &settings);
         }
+        [
+            vec!["env.name".to_owned(), "algorithm.name".to_owned()],
+            keys("env", &self.env.kind.declared()),
+            keys("algorithm", &self.algorithm.kind.declared()),
+            keys("test", TestConfig::SETTINGS),
+            keys("run", RunConfig::SETTINGS),
+        ]
+        .concat()
     }
 }
 
