@@ -5,7 +5,7 @@
 
 mod central;
 
-pub use central::{CentralCritic, CriticReport, CriticSettings, CriticState};
+pub use central::{CentralCritic, CriticMinibatch, CriticReport, CriticSettings, CriticState};
 
 /// What the names of the critic's parameters begin with.
 const CRITIC: &str = "critic";
