@@ -90,7 +90,7 @@ fn whole_episodes_allocate_nothing_on_any_map() {
             for manner in [Manner::Random, Manner::Fierce] {
                 let mut sights = Sights::default();
                 let info = measure(|| {
-                    sights = play(&mut skirmish, &mut observations, &mut actions, (manner, 3));
+                    sights = play(&mut skirmish, &mut observations, &mut actions, (manner, 10));
                 });
                 assert_eq!(
                     info,

@@ -10,6 +10,10 @@ use crate::rules::{
     movement::Footing, profile::Effect,
 };
 
+/// Part of a backswing for which a unit stands. With all of it marines are too slow to their next target: 8 of them need 24.6
+/// steps for 8 that stand, the game's 24.0; with none 22.6.
+const BACKSWING_HELD: f32 = 0.8;
+
 /// A hit that lands at the end of the loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Hit {
@@ -151,7 +155,7 @@ impl Battle {
         }
         unit.swing = None;
         unit.cooldown = strike.period + chance.between(least, greatest) - elapsed;
-        unit.backswing = strike.backswing;
+        unit.backswing = strike.backswing * BACKSWING_HELD;
         self.take_effect(index, target, strike);
     }
 
