@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::rules::{
     BattleState, Battlefield, Chance, Order, Stance, Team, Unit, UnitIndex,
     combat::Hit,
-    movement::{Footing, Obstacle, Steps},
+    movement::{Footing, Obstacle, Steps, on_grid},
     neighbours::Neighbours,
 };
 
@@ -82,6 +82,7 @@ impl Battle {
     pub fn add(&mut self, kind: u8, team: Team, stance: Stance, [x, y]: [f32; 2]) -> UnitIndex {
         let profile = &self.field.profiles[usize::from(kind)];
         let index = UnitIndex::try_from(self.state.units.len()).expect("a battle has ≤ 256 units");
+        let [x, y] = [x, y].map(on_grid);
         self.state.x.push(x);
         self.state.y.push(y);
         self.state.units.push(Unit {

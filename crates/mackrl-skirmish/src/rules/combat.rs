@@ -7,7 +7,8 @@
 
 use crate::rules::{
     Battle, Battlefield, Blow, Chance, Missile, Order, Stance, Strike, Sweep, UnitIndex,
-    movement::Footing, profile::Effect,
+    movement::{Footing, on_grid},
+    profile::Effect,
 };
 
 /// Part of a backswing for which a unit stands. With all of it marines are too slow to their next target: 8 of them need 24.6
@@ -259,8 +260,8 @@ impl Battle {
                 });
                 return false;
             }
-            missile.x += dx / distance * speed;
-            missile.y += dy / distance * speed;
+            missile.x += on_grid(dx / distance * speed);
+            missile.y += on_grid(dy / distance * speed);
             true
         });
     }

@@ -64,7 +64,7 @@ const DETOUR_LOOPS: u8 = 8;
 /// Rounds of pushing apart in a loop, at most.
 const PUSH_ROUNDS: usize = 2;
 /// Map units that a round pushes a unit along an axis, at most.
-const GREATEST_PUSH: f32 = 0.07;
+const GREATEST_PUSH: f32 = 0.070_312_5;
 /// Difference of cosines below which two turns are equal: rounding differs on the two sides of the map, and must not decide.
 const EQUAL_TURNS: f32 = 1e-3;
 /// Map units by which a tangent may cut an obstacle.
@@ -133,8 +133,8 @@ impl Battle {
         let stride = unit.pace.min(distance);
         let ahead = [dx / distance, dy / distance];
         let [way_x, way_y] = self.way_round(index, Wish { ahead, distance });
-        self.scratch.steps.x[index] = x + way_x * stride;
-        self.scratch.steps.y[index] = y + way_y * stride;
+        self.scratch.steps.x[index] = x + on_grid(way_x * stride);
+        self.scratch.steps.y[index] = y + on_grid(way_y * stride);
     }
 
     /// The unit vector along which a walker goes: towards its destination if nothing blocks it, else round what does, on the side
@@ -245,7 +245,8 @@ impl Battle {
                 unit.detour = -unit.detour;
                 unit.detour_loops = 2 * DETOUR_LOOPS;
             }
-            (state.x[index], state.y[index]) = (x, y);
+            state.x[index] += on_grid(x - state.x[index]);
+            state.y[index] += on_grid(y - state.y[index]);
         }
     }
 }
@@ -305,6 +306,16 @@ impl Obstacle {
     }
 }
 
+/// A displacement of less than 1 024 map units, rounded to a multiple of 2⁻¹² map units, halves to the even one.
+///
+/// The engine's numbers are fixed-point with that grain. All positions are multiples of it, so that sums and differences of
+/// them are exact: two armies that are mirror images move as mirror images, to the bit, and pushes add up to the same in any order.
+pub(super) fn on_grid(displacement: f32) -> f32 {
+    // Numbers from 2 048 to 4 096 are that far apart.
+    const SHIFT: f32 = 3_072.0;
+    (displacement + SHIFT) - SHIFT
+}
+
 /// The parts of a vector along a unit vector and to the left of it.
 fn split([x, y]: [f32; 2], [along_x, along_y]: [f32; 2]) -> (f32, f32) {
     (x * along_x + y * along_y, along_x * y - along_y * x)
@@ -326,10 +337,10 @@ impl Steps {
         } else {
             (0.0, 1.0)
         };
-        self.push_x[i] -= ux * overlap * share_i;
-        self.push_y[i] -= uy * overlap * share_i;
-        self.push_x[j] += ux * overlap * share_j;
-        self.push_y[j] += uy * overlap * share_j;
+        self.push_x[i] -= on_grid(ux * overlap * share_i);
+        self.push_y[i] -= on_grid(uy * overlap * share_i);
+        self.push_x[j] += on_grid(ux * overlap * share_j);
+        self.push_y[j] += on_grid(uy * overlap * share_j);
     }
 }
 
