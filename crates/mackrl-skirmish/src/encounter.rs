@@ -13,9 +13,10 @@ use crate::{
     settings::{EnemyBehaviour, SkirmishSettings},
 };
 
-/// Loops for which fresh enemies stand and look for nobody. Recorded runs of teams that stand still last that much longer than
-/// the walk and the volleys take: 3 marines against 3 for 21.8 steps, and for 21.0 without it.
-const MUSTER_LOOPS: f32 = 7.0;
+/// Loops for which fresh enemies stand and look for nobody: SMAC's restart plays some loops until both armies are there, and the
+/// map's order comes after that. Teams of 3 marines that stand still last 21.82 steps in recorded runs, 21.75 here, and 21.26
+/// with two loops less.
+const MUSTER_LOOPS: f32 = 6.0;
 
 /// The battle of a scenario, which can begin again and again.
 #[derive(Debug, Clone)]

@@ -55,7 +55,7 @@ fn play(
             if time_step.end.is_some() {
                 let mut statistics_s = [0.0; BattleStatistics::COUNT];
                 skirmish.statistics(&mut statistics_s);
-                let [_, dead_allies, dead_enemies] = statistics_s;
+                let [_, dead_allies, dead_enemies, _] = statistics_s;
                 sights.deaths += dead_allies + dead_enemies;
                 break;
             }

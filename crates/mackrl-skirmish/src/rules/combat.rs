@@ -11,9 +11,9 @@ use crate::rules::{
     profile::Effect,
 };
 
-/// Part of a backswing for which a unit stands. With all of it marines are too slow to their next target: 8 of them need 24.6
-/// steps for 8 that stand, the game's 24.0; with none 22.6.
-const BACKSWING_HELD: f32 = 0.8;
+/// Part of a backswing for which a unit stands. 8 marines that stand last 23.97 steps in recorded runs and 24.2 here; with all of
+/// it marines are slow to their next target, and it is 24.6, with none they are quick, and it is 23.3.
+const BACKSWING_HELD: f32 = 0.85;
 
 /// A hit that lands at the end of the loop.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -49,16 +49,16 @@ struct Wish {
 }
 
 /// Gap to an obstacle, in map units, at which a walker begins to step round it. With 0.5 a walker sees only the neighbour that it
-/// runs into, and rows of fighters hold up those behind: 25 marines then take 2 steps longer, 2 stalkers with 3 zealots 1 less.
+/// runs into, and rows of fighters hold up those behind: 25 marines then take 2 steps longer.
 pub(super) const LOOKAHEAD: f32 = 2.0;
-/// Cosine of the greatest turn round obstacles, 105°. Walkers that turn back further run about behind their own front: 24
-/// zerglings take 5 steps longer; below 100° armies do not get round it, and 8 marines take 2 steps longer.
+/// Cosine of the greatest turn round obstacles, 105°. Walkers that turn back further, up to 127°, run about behind their own
+/// front: 24 zerglings take 4 steps longer; with 90° stalkers and zealots surround a team that stands a step too soon.
 const LEAST_COSINE: f32 = -0.266;
 /// Obstacles that a walker goes round in one turn, at most.
 const TURNS: usize = 8;
-/// How readily those who fight give way to walking friends, where walkers do with 1. Without it 8 marines are a quarter of a
-/// step slower, and with 0.5 zealots surround too well: 6 hydralisks last 1 step less.
-const FIGHTERS_READINESS: f32 = 0.3;
+/// How readily those who fight give way to walking friends, where walkers do with 1. Without it 8 marines that stand last 25.1
+/// steps, 24.0 in recorded runs, and 25 marines at random 3 steps longer; more of it changes little.
+const FIGHTERS_READINESS: f32 = 0.4;
 /// Loops for which a walker keeps the side on which it steps round.
 const DETOUR_LOOPS: u8 = 8;
 /// Rounds of pushing apart in a loop, at most.

@@ -7,16 +7,15 @@
 
 use crate::rules::{Battle, Order, Stance, UnitIndex};
 
-/// Map units to a friend that fights within which a unit that fights nobody takes that friend's quarry. Without it stragglers
-/// survive too long where armies are large: 25 marines take 1.5 steps longer.
+/// Map units to a friend that fights within which a unit that fights nobody takes that friend's quarry: the radius of a call for
+/// help. Without it stragglers survive too long where armies are large: 25 marines take 2 steps longer.
 const SUPPORT_RADIUS: f32 = 4.0;
-/// Loops between two looks for a quarry.
-const RESCAN_LOOPS: f32 = 4.0;
-/// Map units beyond the scan range of the data in which a unit that is sent to attack notices targets. With 0 enemies walk past
-/// agents that the game's enemies find: random play with 25 marines lasts 57 steps where the game's lasts 37, and returns are too
-/// high, because who notices at weapon range has come nearer by the time it looks. With 3 nobody is overlooked, but in the game one
-/// team in ten on 8m lasts 53 steps, and teams that hide at the northern edge of 3m are not found.
-const NOTICE_MARGIN: f32 = 1.2;
+/// Loops between two looks for a quarry. With 4 and more 25 marines at random do more damage than in recorded runs.
+const RESCAN_LOOPS: f32 = 2.0;
+/// Map units beyond the scan range of the data in which units notice targets. With 0.4 enemies walk past agents that the game's
+/// enemies find, and random play with 25 marines lasts 42 steps where the game's lasts 37; with more than 1.1 they find teams that
+/// hide at the northern edge of 3m, which 57 of 144 such teams of recorded runs did unfound.
+const NOTICE_MARGIN: f32 = 0.9;
 /// Difference of squared distances, in squared map units, below which two targets are equally near.
 const NEARNESS_TOLERANCE: f32 = 1e-3;
 

@@ -15,8 +15,8 @@ fn passive_units_do_exactly_what_they_are_told() {
 
 #[test]
 fn aggressive_units_notice_what_comes_within_their_scan_range() {
-    // A zealot notices at 5 and a margin of 1.2 from edge to edge: 6.2 + 0.5 + 0.375 against a marine.
-    for (distance, notices) in [(7.07, true), (7.09, false)] {
+    // A zealot notices at 5 and a margin of 0.9 from edge to edge: 5.9 + 0.5 + 0.375 against a marine.
+    for (distance, notices) in [(6.77, true), (6.78, false)] {
         let mut arena = Arena::new();
         let zealot = arena.add("zealot", Enemy, Aggressive, [10.0, 16.0]);
         arena.add("marine", Ally, Passive, [10.0 + distance, 16.0]);
@@ -60,7 +60,7 @@ fn a_unit_hit_from_afar_turns_on_its_attacker_and_calls_its_friends() {
     assert_eq!(
         arena.unit(victim).quarry,
         Some(crawler),
-        "8.2 is beyond the 7.575 in which it notices"
+        "8.2 is beyond the 7.275 in which it notices"
     );
     assert_eq!(
         arena.unit(near).quarry,
