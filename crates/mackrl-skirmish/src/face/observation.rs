@@ -74,10 +74,7 @@ impl Scene<'_> {
             NO_OPERATION => false,
             STOP => true,
             MOVES_FROM..TARGETS_FROM => self.knowledge.moves(x, y)[action - MOVES_FROM],
-            _ => {
-                let target = action - TARGETS_FROM;
-                target < self.layout.enemies && self.can_aim(agent, target)
-            }
+            _ => self.can_aim(agent, action - TARGETS_FROM),
         }
     }
 
