@@ -12,7 +12,7 @@ use crate::{
     algorithms::{
         ActorCritic, ActorCriticSettings, Algorithm, AlgorithmKind, Automatic, Preset, Team,
     },
-    hierarchy::{Hierarchy, HierarchySettings},
+    hierarchy::{Hierarchy, HierarchySettings, NetworkStyle},
     partition::PartitionSchedule,
 };
 
@@ -140,6 +140,7 @@ fn parts(table: &toml::Table, team: Team<'_>) -> Result<(Hierarchy, ActorCriticS
     let own = HierarchySettings {
         common_knowledge: settings.common_knowledge,
         hidden: learning.hidden,
+        networks: NetworkStyle::Plain,
     };
     let hierarchy = Hierarchy::new(declaration, team.spec, team.prior, own);
     Ok((hierarchy, learning))
