@@ -183,11 +183,11 @@ pub struct Preset {
 #[must_use]
 pub fn built_in() -> Vec<Arc<dyn AlgorithmKind>> {
     vec![
-        Arc::new(Mackrl),
-        Arc::new(CentralV),
         Arc::new(MackrlPpo),
         Arc::new(Mappo::default()),
         Arc::new(Ippo::default()),
+        Arc::new(Mackrl),
+        Arc::new(CentralV),
     ]
 }
 

@@ -22,6 +22,7 @@ mod controllers;
 mod evaluation;
 mod executor;
 mod factors;
+mod health;
 mod perspective;
 mod statistics;
 mod tables;

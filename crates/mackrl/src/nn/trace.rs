@@ -264,6 +264,18 @@ impl<R: Real> Trace<R> {
         &mut self.logits_gradient.as_mut_slice()[rows.start * outputs..rows.end * outputs]
     }
 
+    /// The hidden states of all steps that are kept [rows, hidden].
+    pub(crate) fn all_hidden(&self) -> &[R] {
+        let end = self.steps.last().map_or(0, |step| step.rows.end);
+        &self.hidden.as_slice()[..end * self.sizes.hidden]
+    }
+
+    /// The logits of all steps that are kept [rows of logits, outputs].
+    pub(crate) fn all_logits(&self) -> &[R] {
+        let end = self.steps.last().map_or(0, |step| step.asked.end);
+        &self.logits.as_slice()[..end * self.sizes.outputs]
+    }
+
     /// The place for the gradient of all logits [rows of logits, outputs], as [`logits_gradient_mut`](Self::logits_gradient_mut)
     /// gives it step by step.
     pub(crate) fn all_logits_gradient_mut(&mut self) -> &mut [R] {

@@ -80,7 +80,11 @@ impl Team {
         )
     }
 
-    fn declared(world: RunWorld, declaration: Declaration, networks: HierarchySettings) -> Self {
+    pub(crate) fn declared(
+        world: RunWorld,
+        declaration: Declaration,
+        networks: HierarchySettings,
+    ) -> Self {
         let hierarchy = Hierarchy::new(declaration, world.spec(), &world.prior(), networks);
         Self { world, hierarchy }
     }

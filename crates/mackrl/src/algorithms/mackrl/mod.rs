@@ -114,10 +114,6 @@ impl AlgorithmKind for Mackrl {
     fn presets(&self) -> &'static [Preset] {
         &[
             Preset {
-                name: "default",
-                text: include_str!("presets/default.toml"),
-            },
-            Preset {
                 name: "fours",
                 text: include_str!("presets/fours.toml"),
             },

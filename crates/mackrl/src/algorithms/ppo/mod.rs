@@ -19,6 +19,8 @@
 //! 8. Adam with ε = 1e-5, gradients of norm at most 10, step sizes that may fall.
 
 mod learner;
+mod memory;
+mod metrics;
 mod settings;
 
 use std::marker::PhantomData;
@@ -33,7 +35,7 @@ pub use settings::{Groups, MackrlPpoSettings, PairMemory, PpoSettings};
 
 use crate::{
     Error,
-    algorithms::{Algorithm, AlgorithmKind, PartitionChoice, Team},
+    algorithms::{Algorithm, AlgorithmKind, PartitionChoice, Preset, Team},
     common_knowledge::CommonKnowledgeFeatures,
     hierarchy::{Hierarchy, HierarchySettings, NetworkStyle, Weighing},
     policy::Declaration,
@@ -150,6 +152,13 @@ impl AlgorithmKind for MackrlPpo {
     fn size(&self, table: &toml::Table, team: Team<'_>) -> Result<usize, Error> {
         let (hierarchy, settings, _) = parts(table, team)?;
         Ok(Ppo::size(&hierarchy, &settings, Sight::State, team))
+    }
+
+    fn presets(&self) -> &'static [Preset] {
+        &[Preset {
+            name: "default",
+            text: include_str!("presets/default.toml"),
+        }]
     }
 }
 

@@ -46,10 +46,10 @@ declare_settings! {
         learning_rate: f64 = 5e-4, Accepts::above_within(0.0, 1.0);
         /// Step size of the critic at the first environment step.
         critic_learning_rate: f64 = 5e-4, Accepts::above_within(0.0, 1.0);
+        /// Environment steps over which step sizes and the weight of the entropy change linearly to what they are in the end.
+        schedule_steps_env: u64 = 200_000, Accepts::integer(1, EXACT);
         /// What both step sizes are multiplied by in the end.
         learning_rate_finish: f64 = 1.0, Accepts::above_within(0.0, 1.0);
-        /// Environment steps over which they fall to that, linearly.
-        learning_rate_steps_env: u64 = 1_000_000, Accepts::integer(1, EXACT);
         /// Times that a batch is gone through. Each epoch is one step of the controllers and one of the critic on the whole batch;
         /// activations are computed anew, from the first step of each episode to the last.
         epochs: usize = 5, Accepts::integer(1, 1000);
@@ -64,13 +64,16 @@ declare_settings! {
         gamma: f64 = 0.99, Accepts::within(0.0, 1.0);
         /// λ of the generalised advantages: 0 looks one step ahead, 1 to the end of the episode.
         lambda: f64 = 0.95, Accepts::within(0.0, 1.0);
-        /// Weight of the entropy of what each group does, over all ways to it, beside its normalised advantage.
-        entropy_weight: f64 = 0.01, Accepts::within(0.0, 1.0);
+        /// Weight of the entropy of what each group does, over all ways to it, beside its normalised advantage, at the first
+        /// environment step.
+        entropy_weight: f64 = 0.05, Accepts::within(0.0, 1.0);
+        /// The same in the end.
+        entropy_weight_finish: f64 = 0.01, Accepts::within(0.0, 1.0);
         /// Longest gradient (Euclidean norm over all parameters of the policy, or of the critic); longer ones are shortened.
         gradient_norm_max: f64 = 10.0, Accepts::above(0.0);
         /// What the orthogonal initial weights of the controllers' last layers are multiplied by: small numbers make the first choices
         /// almost even.
-        policy_gain: f64 = 0.01, Accepts::above(0.0);
+        policy_gain: f64 = 0.01, Accepts::above_within(0.0, 100.0);
         /// Environments that run side by side; each gives one episode to an update.
         environments: usize = 32, Accepts::integer(1, 4096);
         /// Pieces into which the environments are cut for work in parallel; as many threads as this can be used. It decides the
@@ -113,8 +116,18 @@ impl PpoSettings {
     /// What step sizes are multiplied by after so many environment steps.
     #[must_use]
     pub fn learning_rate_factor(&self, steps_env: u64) -> f64 {
-        let progress = (steps_env as f64 / self.learning_rate_steps_env as f64).min(1.0);
-        1.0 + (self.learning_rate_finish - 1.0) * progress
+        1.0 + (self.learning_rate_finish - 1.0) * self.progress(steps_env)
+    }
+
+    /// The weight of the entropy after so many environment steps.
+    #[must_use]
+    pub fn entropy_weight_at(&self, steps_env: u64) -> f64 {
+        let (start, finish) = (self.entropy_weight, self.entropy_weight_finish);
+        start + (finish - start) * self.progress(steps_env)
+    }
+
+    fn progress(&self, steps_env: u64) -> f64 {
+        (steps_env as f64 / self.schedule_steps_env as f64).min(1.0)
     }
 
     /// What makes a value wrong.
@@ -175,16 +188,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn step_sizes_fall_linearly_and_then_stay() {
+    fn what_has_a_schedule_changes_linearly_and_then_stays() {
         let settings = PpoSettings {
             learning_rate_finish: 0.2,
-            learning_rate_steps_env: 1000,
+            entropy_weight: 0.03,
+            entropy_weight_finish: 0.01,
+            schedule_steps_env: 1000,
             ..PpoSettings::default()
         };
         for (steps, expected) in [(0, 1.0), (500, 0.6), (1000, 0.2), (10_000, 0.2)] {
             let found = settings.learning_rate_factor(steps);
             assert!((found - expected).abs() < 1e-12, "{steps}: {found}");
         }
+        assert!((settings.entropy_weight_at(500) - 0.02).abs() < 1e-12);
     }
 
     #[test]
