@@ -96,7 +96,7 @@ pub struct Provenance {
     pub versions: Versions,
     /// The map's name.
     pub map: String,
-    /// SHA-256 of the map's file and the unit statistics it is played with: `cat maps/3m.toml units/liberty.toml | sha256sum`.
+    /// SHA-256 of the map's file and the unit statistics it is played with: `cat maps/3m.toml units/lotv.toml | sha256sum`.
     pub map_sha256: String,
     /// SHA-256 of the configuration without its seed, equal for the repetitions of an experiment:
     /// `grep -v '^seed = ' config.toml | sha256sum`.
@@ -303,11 +303,11 @@ mod tests {
         assert_eq!(unknown.differences(&one), ["versions"]);
     }
 
-    /// `cat maps/3m.toml units/liberty.toml | sha256sum`, and the same for the matrix game's payoffs.
+    /// `cat maps/3m.toml units/lotv.toml | sha256sum`, and the same for the matrix game's payoffs.
     #[test]
     fn map_data_are_the_files_of_map_and_units() {
         let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../mackrl-skirmish");
-        let files: String = ["maps/3m.toml", "units/liberty.toml"]
+        let files: String = ["maps/3m.toml", "units/lotv.toml"]
             .map(|file| std::fs::read_to_string(data.join(file)).unwrap())
             .concat();
         assert_eq!(provenance(|_| ()).map_sha256, sha256(files.as_bytes()));

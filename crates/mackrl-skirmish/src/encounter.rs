@@ -13,6 +13,11 @@ use crate::{
     settings::{EnemyBehaviour, SkirmishSettings},
 };
 
+/// Loops for which fresh enemies stand and look for nobody: SMAC's restart plays some loops until both armies are there, and the
+/// map's order comes after that. Teams of 3 marines that stand still last 21.82 steps in recorded runs, 21.75 here, and 21.38
+/// with two loops less.
+const MUSTER_LOOPS: f32 = 6.0;
+
 /// The battle of a scenario, which can begin again and again.
 #[derive(Debug, Clone)]
 pub struct Encounter {
@@ -109,6 +114,7 @@ impl Encounter {
                 to: self.place_in_formation(index, to),
             });
             self.battle.order(unit_index(index), order);
+            self.battle.hold(unit_index(index), MUSTER_LOOPS);
         }
     }
 

@@ -32,4 +32,4 @@ pub use unit_types::UnitData;
 /// Version of the rules and of their data: one key and the same actions give the same battle in every program with this number.
 ///
 /// It is raised whenever `tests/golden/skirmish_hashes.txt` is recorded anew.
-pub const SIMULATOR_VERSION: u32 = 2;
+pub const SIMULATOR_VERSION: u32 = 3;

@@ -259,6 +259,18 @@ impl Scenario {
         known.map(|(_, name)| *name)
     }
 
+    /// Whether an agent is a healer, which chooses friends instead of enemies.
+    #[must_use]
+    pub fn is_healer(&self, agent: usize) -> bool {
+        let kind = usize::from(self.recruits[agent].kind);
+        self.field.profiles[kind].care.is_some()
+    }
+
+    /// The agents that a healer chooses from, all that are none themselves, in the order in which it numbers them.
+    pub fn patients(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.agents).filter(|agent| !self.is_healer(*agent))
+    }
+
     /// Number of enemies.
     #[must_use]
     pub fn enemies(&self) -> usize {

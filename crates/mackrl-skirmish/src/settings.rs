@@ -34,8 +34,9 @@ declare_words! {
 declare_settings! {
     /// How a skirmish is played and shown to agents.
     pub struct SkirmishSettings {
-        /// Which statistics units have: those of Wings of Liberty, as SMAC's maps use them, or those of Legacy of the Void.
-        units: UnitData = UnitData::Liberty, UnitData::ACCEPTS;
+        /// Which statistics units have: those of Legacy of the Void, or those of Wings of Liberty, on whose data SMAC's maps depend by
+        /// their files. Recorded runs of the game speak for the former: see `DEVIATIONS.md`.
+        units: UnitData = UnitData::Lotv, UnitData::ACCEPTS;
         /// Which of SMAC's peculiarities are kept: all (absolute rewards, swapped one-hot types of enemies) or none.
         compat: Compatibility = Compatibility::Smac, Compatibility::ACCEPTS;
         /// What the enemies are told when an episode begins: what their map says, or to go for the nearest agent, wherever it is. Not in
@@ -51,6 +52,9 @@ declare_settings! {
         sight_range: f32 = 9.0, Accepts::above_within(0.0, 64.0);
         /// Map units within which a target may be chosen, centre to centre, inclusive; below `sight_range`.
         shoot_range: f32 = 6.0, Accepts::above_within(0.0, 64.0);
+        /// Steps after which an episode ends undecided; 0 for the limit of the map. Running out of time is no defeat and pays nothing.
+        /// Not in SMAC, whose maps say it.
+        episode_limit: usize = 0, Accepts::integer(0, 100_000);
         /// Game loops in a step, of which the game has 22.4 in a second.
         step_mul: u8 = 8, Accepts::integer(1, 64);
         /// Whether only what happens to enemies is rewarded.
@@ -63,7 +67,7 @@ declare_settings! {
         reward_death_value: f32 = 10.0, Accepts::within(0.0, 1e9);
         /// Reward for winning, before scaling.
         reward_win: f32 = 200.0, Accepts::within(0.0, 1e9);
-        /// Reward for losing, before scaling; usually 0 or less.
+        /// Reward for losing, before scaling; usually 0 or less. Running out of time is no defeat and pays none.
         reward_defeat: f32 = 0.0, Accepts::within(-1e9, 1e9);
         /// Weight of the team's own losses when `reward_only_positive` is off.
         reward_negative_scale: f32 = 0.5, Accepts::within(0.0, 1e9);
@@ -200,6 +204,7 @@ mod tests {
         let further = [
             "compat",
             "enemy_order",
+            "episode_limit",
             "shoot_range",
             "sight_range",
             "spawn_scatter",

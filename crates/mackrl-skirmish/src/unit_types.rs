@@ -16,10 +16,10 @@ pub const LOOPS_PER_SECOND: f32 = 16.0;
 declare_words! {
     /// Which statistics units have.
     pub enum UnitData {
-        /// Base Wings of Liberty, on which SMAC's maps depend.
-        #[default]
+        /// Base Wings of Liberty, on whose data SMAC's maps depend by their files.
         Liberty = "liberty",
-        /// Legacy of the Void 4.10, which other simulators of these maps follow.
+        /// Legacy of the Void 4.10, with which recorded runs of the game agree better.
+        #[default]
         Lotv = "lotv",
     }
 }

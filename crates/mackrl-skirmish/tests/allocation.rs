@@ -55,7 +55,7 @@ fn play(
             if time_step.end.is_some() {
                 let mut statistics_s = [0.0; BattleStatistics::COUNT];
                 skirmish.statistics(&mut statistics_s);
-                let [_, dead_allies, dead_enemies] = statistics_s;
+                let [_, dead_allies, dead_enemies, _] = statistics_s;
                 sights.deaths += dead_allies + dead_enemies;
                 break;
             }
@@ -90,7 +90,7 @@ fn whole_episodes_allocate_nothing_on_any_map() {
             for manner in [Manner::Random, Manner::Fierce] {
                 let mut sights = Sights::default();
                 let info = measure(|| {
-                    sights = play(&mut skirmish, &mut observations, &mut actions, (manner, 3));
+                    sights = play(&mut skirmish, &mut observations, &mut actions, (manner, 10));
                 });
                 assert_eq!(
                     info,

@@ -14,7 +14,7 @@ fn every_map_keeps_the_contract() {
     let mut total = Coverage::default();
     for name in mackrl_skirmish::map_names() {
         let mut environment = mackrl_skirmish::make(name, &SkirmishSettings::default()).unwrap();
-        let coverage = check_environment(&mut environment, 2);
+        let coverage = check_environment(&mut environment, 3);
         total.alterations += coverage.alterations;
         total.other_actions += coverage.other_actions;
     }

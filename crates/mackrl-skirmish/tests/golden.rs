@@ -14,7 +14,7 @@ const MARKS: [usize; 2] = [40, 120];
 /// What the recording was made with, whatever the default is: wide enough that all rules of a start are met.
 const SPAWN_SCATTER: f32 = 0.5;
 /// The version of the simulator, and a hash of what it recorded.
-const RECORDED: (u32, u64) = (2, 0x285C_7BD2_023C_484C);
+const RECORDED: (u32, u64) = (3, 0x6256_B6B4_7D88_5F3E);
 
 /// Plays random available actions, episode after episode; `watch` is called after every step, counted from 1.
 fn play(skirmish: &mut Skirmish, steps: usize, mut watch: impl FnMut(&Skirmish, usize)) {

@@ -157,7 +157,7 @@ pub(crate) struct ServeArgs {
     pub(crate) port: u16,
 
     /// Statistics of the units
-    #[arg(long, value_name = "NAME", value_enum, default_value = "liberty")]
+    #[arg(long, value_name = "NAME", value_enum, default_value = "lotv")]
     pub(crate) units: UnitsChoice,
 
     /// Seed of games for which the client names none [default: the number of the process]
@@ -176,7 +176,7 @@ pub(crate) struct ServeArgs {
 /// Which statistics units have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum UnitsChoice {
-    /// Base Wings of Liberty, on which SMAC's maps depend
+    /// Base Wings of Liberty, on whose data SMAC's maps depend by their files
     Liberty,
     /// Legacy of the Void 4.10
     Lotv,

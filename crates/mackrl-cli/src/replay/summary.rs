@@ -20,6 +20,7 @@ pub(crate) struct Summary {
     ep_length: usize,
     dead_allies: usize,
     dead_enemies: usize,
+    timed_out: bool,
     state_hash: String,
 }
 
@@ -33,6 +34,7 @@ impl Summary {
             battle_won,
             dead_allies,
             dead_enemies,
+            timed_out,
         } = playback.statistics;
         Self {
             map: replay.env.map().to_owned(),
@@ -44,6 +46,7 @@ impl Summary {
             ep_length: playback.steps(),
             dead_allies,
             dead_enemies,
+            timed_out,
             state_hash: format!("{:016x}", playback.skirmish.state_hash()),
         }
     }
@@ -54,7 +57,7 @@ impl Summary {
     pub(super) fn outcome(&self) -> String {
         format!(
             "{} after {} steps, return {:.2}, allies lost: {}, enemies lost: {}",
-            if self.battle_won { "won" } else { "not won" },
+            crate::output::outcome(self.battle_won, self.timed_out),
             self.ep_length,
             self.total,
             self.dead_allies,

@@ -19,8 +19,11 @@ use crate::{
 pub struct SkirmishKnowledge {
     terrain: Arc<Terrain>,
     agents: usize,
+    enemies: usize,
     /// Per agent: whether its targets are friends to heal instead of enemies.
     heals: Vec<bool>,
+    /// The agents that healers choose from.
+    patients: Vec<usize>,
     sight_squared: f32,
     shoot_squared: f32,
     /// How far ahead a move looks: half of what it goes.
@@ -29,15 +32,14 @@ pub struct SkirmishKnowledge {
 
 impl SkirmishKnowledge {
     pub(super) fn new(scenario: &Scenario, settings: &SkirmishSettings) -> Self {
-        let profiles = &scenario.field.profiles;
-        let agents = &scenario.recruits[..scenario.agents];
         Self {
             terrain: scenario.field.terrain.clone(),
             agents: scenario.agents,
-            heals: agents
-                .iter()
-                .map(|agent| profiles[usize::from(agent.kind)].care.is_some())
+            enemies: scenario.enemies(),
+            heals: (0..scenario.agents)
+                .map(|agent| scenario.is_healer(agent))
                 .collect(),
+            patients: scenario.patients().collect(),
             sight_squared: settings.sight_range * settings.sight_range,
             shoot_squared: settings.shoot_range * settings.shoot_range,
             move_ahead: f64::from(settings.move_amount) / 2.0,
@@ -62,15 +64,15 @@ impl SkirmishKnowledge {
         self.heals[agent]
     }
 
-    /// The unit that the `target`-th action with a target of `agent` is about, if that can be aimed at: an enemy, or for a
-    /// healer a friend that is none. Healers aim at agents by the numbers that others have for enemies, so that they cannot
-    /// aim at more friends than there are enemies.
+    /// The unit that the `target`-th action with a target of `agent` is about, if there is one: an enemy, or for a healer a friend
+    /// that is none. In SMAC, where there are no more actions with a target than enemies, healers cannot choose friends beyond
+    /// that number; here there is an action for each.
     #[must_use]
     pub fn target(&self, agent: usize, target: usize) -> Option<usize> {
         if self.heals[agent] {
-            (target < self.agents && !self.heals[target]).then_some(target)
+            self.patients.get(target).copied()
         } else {
-            Some(self.agents + target)
+            (target < self.enemies).then_some(self.agents + target)
         }
     }
 

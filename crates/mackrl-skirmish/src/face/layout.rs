@@ -23,9 +23,9 @@ pub struct Layout {
     pub ally_shields: usize,
     /// 1 if enemies are observed with shields, else 0.
     pub enemy_shields: usize,
-    /// Length of SMAC's one-hot of types: 0 if the allies are all of one type.
+    /// Length of SMAC's one-hot of types: the number of types on both sides, 0 if each side is all of one type.
     pub type_bits: usize,
-    /// Per kind: its place in the one-hot of an ally, if allies have such units.
+    /// Per kind: its place in the one-hot of an ally.
     pub(super) ally_type: Vec<Option<usize>>,
     /// Per kind: its place in the one-hot of an enemy.
     pub(super) enemy_type: Vec<Option<usize>>,
@@ -56,16 +56,15 @@ pub struct Layout {
 impl Layout {
     pub(super) fn new(scenario: &Scenario, settings: &SkirmishSettings) -> Self {
         let kinds = scenario.field.profiles.len();
-        let mut ally_kinds: Vec<usize> = scenario
-            .recruits
-            .iter()
-            .filter(|recruit| recruit.team == Team::Ally)
-            .map(|recruit| usize::from(recruit.kind))
-            .collect();
-        ally_kinds.sort_unstable();
-        ally_kinds.dedup();
-        let type_bits = if ally_kinds.len() > 1 {
-            ally_kinds.len()
+        // Where both sides have the same kinds, as on all maps of SMAC on which there is something to tell apart, these are the
+        // numbers of SMAC, which knows the kinds of allies alone.
+        let is_mixed = |team: Team| {
+            let mut army = scenario.recruits.iter().filter(|unit| unit.team == team);
+            let first = army.next();
+            army.any(|unit| Some(unit.kind) != first.map(|first| first.kind))
+        };
+        let type_bits = if is_mixed(Team::Ally) || is_mixed(Team::Enemy) {
+            kinds
         } else {
             0
         };
@@ -75,15 +74,16 @@ impl Layout {
                 .position(|other| *other == kind)
                 .filter(|_| type_bits > 0)
         };
-        let enemy_order = enemy_type_order(scenario, settings.compat, &ally_kinds);
+        let ally_order: Vec<usize> = (0..kinds).collect();
+        let enemy_order = enemy_type_order(scenario, settings.compat, &ally_order);
         Self {
             agents: scenario.agents,
             enemies: scenario.enemies(),
-            actions: TARGETS_FROM + scenario.enemies(),
+            actions: TARGETS_FROM + targets(scenario),
             ally_shields: usize::from(scenario.races[0] == Race::Protoss),
             enemy_shields: usize::from(scenario.races[1] == Race::Protoss),
             type_bits,
-            ally_type: (0..kinds).map(|kind| place(&ally_kinds, kind)).collect(),
+            ally_type: (0..kinds).map(|kind| place(&ally_order, kind)).collect(),
             enemy_type: (0..kinds).map(|kind| place(&enemy_order, kind)).collect(),
             obs_last_action: settings.obs_last_action,
             state_last_action: settings.state_last_action,
@@ -203,7 +203,10 @@ impl Layout {
             actions: self.actions,
             observation_size: self.observation_size(),
             state_size: self.state_size(),
-            episode_limit: scenario.episode_limit,
+            episode_limit: match settings.episode_limit {
+                0 => scenario.episode_limit,
+                limit => limit,
+            },
             distance_scale: settings.sight_range,
             statistics: BattleStatistics::declared().to_vec(),
             success: Some(0),
@@ -211,14 +214,23 @@ impl Layout {
     }
 }
 
+/// Actions with a target: as many as there are enemies, or agents that a healer can choose if those are more.
+fn targets(scenario: &Scenario) -> usize {
+    let patients = scenario.patients().count();
+    let has_healers = patients < scenario.agents;
+    scenario
+        .enemies()
+        .max(if has_healers { patients } else { 0 })
+}
+
 /// Kinds in the order of the one-hot of enemies. SMAC numbers allies by their own type ids, which are alphabetical, and
 /// enemies by the game's, which differ on maps of stalkers (74) and zealots (73): there an enemy zealot comes first.
 fn enemy_type_order(
     scenario: &Scenario,
     compat: Compatibility,
-    ally_kinds: &[usize],
+    ally_order: &[usize],
 ) -> Vec<usize> {
-    let mut order = ally_kinds.to_vec();
+    let mut order = ally_order.to_vec();
     let names: Vec<&str> = order
         .iter()
         .map(|kind| scenario.field.profiles[*kind].name.as_str())

@@ -74,10 +74,7 @@ impl Scene<'_> {
             NO_OPERATION => false,
             STOP => true,
             MOVES_FROM..TARGETS_FROM => self.knowledge.moves(x, y)[action - MOVES_FROM],
-            _ => {
-                let target = action - TARGETS_FROM;
-                target < self.layout.enemies && self.can_aim(agent, target)
-            }
+            _ => self.can_aim(agent, action - TARGETS_FROM),
         }
     }
 
@@ -161,6 +158,10 @@ impl Scene<'_> {
             let can_heal = heals.then(|| self.can_aim(agent, enemy));
             let can_shoot = self.write_enemy((agent, index), can_heal, &mut row, &mut seen);
             available_a[TARGETS_FROM + enemy] = can_heal.unwrap_or(can_shoot);
+        }
+        let beyond = TARGETS_FROM + self.layout.enemies;
+        for (number, available) in available_a[beyond..].iter_mut().enumerate() {
+            *available = self.can_aim(agent, self.layout.enemies + number);
         }
         for ally in (0..self.layout.agents).filter(|ally| *ally != agent) {
             self.write_ally(agent, ally, &mut row, &mut seen);

@@ -4,11 +4,12 @@ use mackrl_env::Action;
 
 use crate::{
     face::observation::{Cursor, Scene, shield_fraction},
+    rules::Profile,
     terrain::MAP_SIZE,
 };
 
-/// What SMAC divides weapon cooldowns by, in loops, by type. They fit no set of statistics well, and with some types the
-/// feature exceeds 1.
+/// What SMAC divides weapon cooldowns by, in loops, for the types that its agents have. They fit no set of statistics well, and
+/// with some types the feature exceeds 1.
 const COOLDOWN_SCALES: &[(&str, f32)] = &[
     ("marine", 15.0),
     ("marauder", 25.0),
@@ -19,14 +20,15 @@ const COOLDOWN_SCALES: &[(&str, f32)] = &[
     ("zergling", 11.0),
     ("baneling", 1.0),
 ];
-const DEFAULT_COOLDOWN_SCALE: f32 = 15.0;
 
-/// What weapon cooldowns of the type called `name` are divided by.
-pub(super) fn cooldown_scale(name: &str) -> f32 {
-    COOLDOWN_SCALES
+/// What weapon cooldowns of a type are divided by: what SMAC divides them by, or the period of the weapon if it has no such
+/// type. Only the jitter can then exceed 1.
+pub(super) fn cooldown_scale(profile: &Profile) -> f32 {
+    let of_smac = COOLDOWN_SCALES
         .iter()
-        .find(|(known, _)| *known == name)
-        .map_or(DEFAULT_COOLDOWN_SCALE, |(_, scale)| *scale)
+        .find(|(known, _)| *known == profile.name);
+    let own = profile.strike.as_ref().map(|strike| strike.period);
+    of_smac.map(|(_, scale)| *scale).or(own).unwrap_or(1.0)
 }
 
 impl Scene<'_> {

@@ -12,11 +12,13 @@ pub struct BattleStatistics {
     pub dead_allies: usize,
     /// Enemies that have died.
     pub dead_enemies: usize,
+    /// Whether the limit of steps has ended the episode, undecided.
+    pub timed_out: bool,
 }
 
 impl BattleStatistics {
     /// S: how many numbers these are.
-    pub const COUNT: usize = 3;
+    pub const COUNT: usize = 4;
 
     /// The names and meanings of [`values`](Self::values).
     #[must_use]
@@ -25,6 +27,10 @@ impl BattleStatistics {
             Statistic::new("battle_won", "1 if the battle was won, else 0"),
             Statistic::new("dead_allies", "number of agents lost"),
             Statistic::new("dead_enemies", "number of enemies defeated"),
+            Statistic::new(
+                "timed_out",
+                "1 if the limit of steps ended the episode undecided, else 0",
+            ),
         ]
     }
 
@@ -35,6 +41,7 @@ impl BattleStatistics {
             f64::from(u8::from(self.battle_won)),
             self.dead_allies as f64,
             self.dead_enemies as f64,
+            f64::from(u8::from(self.timed_out)),
         ]
     }
 }

@@ -77,10 +77,7 @@ impl Face {
         Ok(Self {
             spec: layout.spec(&scenario, &settings),
             knowledge: Arc::new(SkirmishKnowledge::new(&scenario, &settings)),
-            cooldown_scales: profiles
-                .iter()
-                .map(|profile| cooldown_scale(&profile.name))
-                .collect(),
+            cooldown_scales: profiles.iter().map(cooldown_scale).collect(),
             rewards: Rewards::new(start, scenario.agents, &settings),
             last_actions: vec![None; scenario.agents],
             steps: 0,
@@ -220,13 +217,14 @@ impl Face {
         self.steps += 1;
         let outcome = self.outcome(state);
         let reward = self.rewards.settle(state, outcome, &self.settings);
+        let end = self.end(outcome);
         self.statistics = BattleStatistics {
             battle_won: outcome == Outcome::Won,
             dead_allies: self.layout.agents - state.living(Team::Ally),
             dead_enemies: self.layout.enemies - state.living(Team::Enemy),
+            timed_out: end == Some(EpisodeEnd::Truncated),
         };
         self.write(state, out);
-        let end = self.end(outcome);
         self.tally.battles_game += u64::from(end.is_some());
         self.tally.battles_won += u64::from(outcome == Outcome::Won);
         self.tally.timeouts += u64::from(end == Some(EpisodeEnd::Truncated));

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::rules::{
     BattleState, Battlefield, Chance, Order, Stance, Team, Unit, UnitIndex,
     combat::Hit,
-    movement::{Footing, Steps},
+    movement::{Footing, Obstacle, Steps, on_grid},
     neighbours::Neighbours,
 };
 
@@ -28,10 +28,14 @@ pub(super) struct Scratch {
     pub(super) hits: Vec<Hit>,
     /// Healers and their patients in this loop.
     pub(super) treatments: Vec<(usize, usize)>,
+    /// Units that come to help a friend in this loop, and whom they fight.
+    pub(super) supports: Vec<(usize, UnitIndex)>,
     /// Units that explode at the end of this loop.
     pub(super) exploding: Vec<usize>,
     /// Where units are about to be.
     pub(super) steps: Steps,
+    /// What does not move aside for the walker at hand.
+    pub(super) obstacles: Vec<Obstacle>,
     /// Units that can be in each other's way.
     pub(super) neighbours: Neighbours,
 }
@@ -78,6 +82,7 @@ impl Battle {
     pub fn add(&mut self, kind: u8, team: Team, stance: Stance, [x, y]: [f32; 2]) -> UnitIndex {
         let profile = &self.field.profiles[usize::from(kind)];
         let index = UnitIndex::try_from(self.state.units.len()).expect("a battle has ≤ 256 units");
+        let [x, y] = [x, y].map(on_grid);
         self.state.x.push(x);
         self.state.y.push(y);
         self.state.units.push(Unit {
@@ -126,6 +131,13 @@ impl Battle {
         }
     }
 
+    /// Lets a unit stand for so many loops, in which it looks for nobody.
+    pub fn hold(&mut self, unit: UnitIndex, loops: f32) {
+        let unit = &mut self.state.units[usize::from(unit)];
+        unit.backswing = loops;
+        unit.rescan = loops;
+    }
+
     /// Takes a unit off the field: it is dead, without the effects that a death in battle has.
     pub fn remove(&mut self, unit: UnitIndex) {
         let unit = &mut self.state.units[usize::from(unit)];
@@ -153,6 +165,8 @@ impl Battle {
         make_room(&mut self.scratch.hits, 4 * units);
         make_room(&mut self.scratch.exploding, units);
         make_room(&mut self.scratch.treatments, units);
+        make_room(&mut self.scratch.supports, units);
+        make_room(&mut self.scratch.obstacles, units);
         self.scratch.destination.resize(units, None);
         self.scratch.footing.resize(units, Footing::Standing);
         self.scratch.steps.resize(units);

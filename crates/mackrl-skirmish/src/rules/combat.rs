@@ -7,8 +7,13 @@
 
 use crate::rules::{
     Battle, Battlefield, Blow, Chance, Missile, Order, Stance, Strike, Sweep, UnitIndex,
-    movement::Footing, profile::Effect,
+    movement::{Footing, on_grid},
+    profile::Effect,
 };
+
+/// Part of a backswing for which a unit stands. 8 marines that stand last 23.97 steps in recorded runs and 24.2 here; with all of
+/// it marines are slow to their next target, and it is 24.6, with none they are quick, and it is 23.3.
+const BACKSWING_HELD: f32 = 0.85;
 
 /// A hit that lands at the end of the loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -151,7 +156,7 @@ impl Battle {
         }
         unit.swing = None;
         unit.cooldown = strike.period + chance.between(least, greatest) - elapsed;
-        unit.backswing = strike.backswing;
+        unit.backswing = strike.backswing * BACKSWING_HELD;
         self.take_effect(index, target, strike);
     }
 
@@ -255,8 +260,8 @@ impl Battle {
                 });
                 return false;
             }
-            missile.x += dx / distance * speed;
-            missile.y += dy / distance * speed;
+            missile.x += on_grid(dx / distance * speed);
+            missile.y += on_grid(dy / distance * speed);
             true
         });
     }

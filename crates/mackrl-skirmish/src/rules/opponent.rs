@@ -1,13 +1,21 @@
 //! What aggressive units do unasked: scan, acquire, retarget, answer attacks, call for help, give up.
 //!
-//! The game data give the ranges (scan, help, leash); how often the engine looks and how it breaks ties is not known. Here every
+//! The game data give ranges (scan, help, leash); how often the engine looks and how it breaks ties is not known. Here every
 //! unit looks each quarter of a second, and at once when its quarry has died. Without a quarry it takes the nearest target
-//! that it notices; with one in weapon range it stays with it until one is dead; with one out of range it takes the nearest. Fog is lifted on these maps, so sight plays no part.
+//! that it notices. It keeps its quarry until one of the two is dead; only if the quarry is out of reach and another is in reach
+//! it turns to that. One that notices nobody helps friends near it that fight. Fog is lifted on these maps, so sight plays no part.
 
 use crate::rules::{Battle, Order, Stance, UnitIndex};
 
-/// Loops between two looks for a quarry.
-const RESCAN_LOOPS: f32 = 4.0;
+/// Map units to a friend that fights within which a unit that fights nobody takes that friend's quarry: the radius of a call for
+/// help. Without it stragglers survive too long where armies are large: 25 marines take 2 steps longer.
+const SUPPORT_RADIUS: f32 = 4.0;
+/// Loops between two looks for a quarry. With 4 and more 25 marines at random do more damage than in recorded runs.
+const RESCAN_LOOPS: f32 = 2.0;
+/// Map units beyond the scan range of the data in which units notice targets. With 0.4 enemies walk past agents that the game's
+/// enemies find, and random play with 25 marines lasts 41 steps where the game's lasts 37; with more than 1.1 they find teams that
+/// hide at the northern edge of 3m, which 57 of 144 such teams of recorded runs did unfound.
+const NOTICE_MARGIN: f32 = 0.9;
 /// Difference of squared distances, in squared map units, below which two targets are equally near.
 const NEARNESS_TOLERANCE: f32 = 1e-3;
 
@@ -24,6 +32,31 @@ impl Battle {
                 self.choose_quarry(index);
             }
         }
+        self.support_friends();
+    }
+
+    /// Lets those who have just looked and found nobody help friends near them that fight. That comes after everybody's own
+    /// choice, so that the order of units in the arrays is of no consequence.
+    fn support_friends(&mut self) {
+        for index in 0..self.state.units.len() {
+            let unit = &self.state.units[index];
+            let has_just_looked = unit.rescan == RESCAN_LOOPS && unit.swing.is_none();
+            let is_free = matches!(unit.order, Order::AttackMove { .. } | Order::Stop);
+            let is_idle = unit.quarry.is_none() && unit.stance == Stance::Aggressive;
+            if has_just_looked
+                && is_free
+                && is_idle
+                && unit.is_alive()
+                && let Some(quarry) = self.quarry_to_support(index)
+            {
+                self.scratch.supports.push((index, quarry));
+            }
+        }
+        for number in 0..self.scratch.supports.len() {
+            let (index, quarry) = self.scratch.supports[number];
+            self.engage(index, quarry);
+        }
+        self.scratch.supports.clear();
     }
 
     fn choose_quarry(&mut self, index: usize) {
@@ -43,6 +76,10 @@ impl Battle {
             return;
         }
         let found = self.nearest_target(index, false);
+        let is_chasing = self.state.units[index].quarry.is_some();
+        if is_chasing && !found.is_some_and(|other| self.is_in_reach(index, usize::from(other))) {
+            return;
+        }
         let hunts = self.state.units[index].order == Order::Hunt;
         let found = found.or_else(|| hunts.then(|| self.nearest_target(index, true)).flatten());
         if let Some(target) = found {
@@ -73,6 +110,27 @@ impl Battle {
         })
     }
 
+    /// The nearest unit that a friend near `index` fights.
+    fn quarry_to_support(&self, index: usize) -> Option<UnitIndex> {
+        let team = self.state.units[index].team;
+        let mut nearest = Nearest::default();
+        for (friend, unit) in self.state.units.iter().enumerate() {
+            let Some(quarry) = unit.quarry.map(usize::from) else {
+                continue;
+            };
+            let is_near = unit.team == team
+                && unit.is_alive()
+                && self.state.distance_squared(index, friend) <= SUPPORT_RADIUS * SUPPORT_RADIUS;
+            // What a healer has chosen is a friend.
+            let is_enemy = self.state.units[quarry].team != team;
+            if is_near && is_enemy && self.can_attack(index, quarry) {
+                let square = self.state.distance_squared(index, quarry);
+                nearest.consider(quarry, square, self.state.y[quarry]);
+            }
+        }
+        nearest.unit()
+    }
+
     /// The nearest unit of the other side that `index` can attack, within its scan range or anywhere. All types have the same
     /// priority.
     fn nearest_target(&self, index: usize, anywhere: bool) -> Option<UnitIndex> {
@@ -88,7 +146,8 @@ impl Battle {
             let (dx, dy) = (self.state.x[other] - x, self.state.y[other] - y);
             let square = dx * dx + dy * dy;
             let kind = usize::from(candidate.kind);
-            let scan = own.scan_range + own.radius + self.field.profiles[kind].radius;
+            let scan =
+                own.scan_range + NOTICE_MARGIN + own.radius + self.field.profiles[kind].radius;
             if (anywhere || square <= scan * scan) && strike.effects[kind].can_hit {
                 nearest.consider(other, square, self.state.y[other]);
             }

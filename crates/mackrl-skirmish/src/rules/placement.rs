@@ -3,7 +3,10 @@
 use std::{collections::BTreeMap, sync::LazyLock};
 
 use crate::{
-    rules::{Battle, BattleState, Chance, Profile, movement::Footing},
+    rules::{
+        Battle, BattleState, Chance, Profile,
+        movement::{Footing, on_grid},
+    },
     terrain::Terrain,
     unit_types::Layer,
 };
@@ -127,8 +130,8 @@ impl Battle {
         let field = self.field.clone();
         for index in 0..self.state.units.len() {
             let profile = &field.profiles[usize::from(self.state.units[index].kind)];
-            let x = self.state.x[index] + chance.between(-scatter, scatter);
-            let y = self.state.y[index] + chance.between(-scatter, scatter);
+            let x = self.state.x[index] + on_grid(chance.between(-scatter, scatter));
+            let y = self.state.y[index] + on_grid(chance.between(-scatter, scatter));
             self.scratch.footing[index] = if profile.is_immobile() {
                 Footing::Braced
             } else {

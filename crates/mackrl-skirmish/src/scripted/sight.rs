@@ -143,13 +143,11 @@ impl<'a> Sight<'a> {
     }
 }
 
-/// The action by which a healer heals an agent: the one that others have for the enemy of the same number. None for healers
-/// and for agents beyond the number of enemies.
+/// The action by which a healer heals an agent. None for healers.
 fn heal_action(scenario: &Scenario, entity: EntityId) -> Option<usize> {
-    let friend = entity.index();
-    let profile = &scenario.field.profiles[usize::from(scenario.recruits[friend].kind)];
-    let can_be_healed = profile.care.is_none() && friend < scenario.enemies();
-    can_be_healed.then_some(TARGETS_FROM + friend)
+    let mut patients = scenario.patients();
+    let number = patients.position(|patient| patient == entity.index());
+    number.map(|number| TARGETS_FROM + number)
 }
 
 /// Life and shield points of an entity with these features.

@@ -51,8 +51,8 @@ fn agents_walk_to_an_enemy_that_stays_at_home() {
 
 #[test]
 fn kiting_stalkers_kill_zealots_that_standing_ones_do_not() {
-    let (_, standing) = play("3s_vs_5z", ScriptedPolicy::Nearest, 10);
-    let (_, kiting) = play("3s_vs_5z", ScriptedPolicy::Kite, 10);
+    let (_, standing) = play("3s_vs_5z", ScriptedPolicy::Nearest, 30);
+    let (_, kiting) = play("3s_vs_5z", ScriptedPolicy::Kite, 30);
     assert!(kiting > standing + 5, "{kiting} killed against {standing}");
 }
 

@@ -17,8 +17,8 @@ use crate::{commands::sc2, output};
 
 /// Episodes that a thread takes at once.
 const PORTION: usize = 16;
-/// What is averaged: won, return, length, allies lost, enemies lost.
-type Outcome = [f64; 5];
+/// What is averaged: won, return, length, allies lost, enemies lost, out of time.
+type Outcome = [f64; 6];
 
 /// Means over the episodes of one map and one policy, each with its standard error.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -37,6 +37,8 @@ pub(super) struct Row {
     dead_allies_sem: f64,
     dead_enemies_mean: f64,
     dead_enemies_sem: f64,
+    timed_out_mean: f64,
+    timed_out_sem: f64,
 }
 
 /// Plays episodes 0 to `episodes` of `map` by `policy`; `report` hears how many are done. `threads` changes no result.
@@ -139,8 +141,16 @@ impl Player {
         }
         let mut statistics_s = [0.0; BattleStatistics::COUNT];
         self.environment.statistics(&mut statistics_s);
-        let [battle_won, dead_allies, dead_enemies] = statistics_s;
-        Ok([battle_won, total, step as f64, dead_allies, dead_enemies])
+        let [battle_won, dead_allies, dead_enemies, timed_out] = statistics_s;
+        let length = step as f64;
+        Ok([
+            battle_won,
+            total,
+            length,
+            dead_allies,
+            dead_enemies,
+            timed_out,
+        ])
     }
 }
 
@@ -180,7 +190,8 @@ impl Sums {
 
 impl Row {
     fn new(map: &EnvironmentConfig, policy: ScriptedPolicy, seed: u64, sums: &Sums) -> Self {
-        let [won, total, length, allies, enemies] = [0, 1, 2, 3, 4].map(|index| sums.mean(index));
+        let [won, total, length, allies, enemies, late] =
+            [0, 1, 2, 3, 4, 5].map(|index| sums.mean(index));
         Self {
             map: map.map().to_owned(),
             policy: policy.name(),
@@ -201,6 +212,8 @@ impl Row {
             dead_allies_sem: allies[1],
             dead_enemies_mean: enemies[0],
             dead_enemies_sem: enemies[1],
+            timed_out_mean: late[0],
+            timed_out_sem: late[1],
         }
     }
 
@@ -234,6 +247,7 @@ impl Row {
             "length",
             "allies lost",
             "enemies lost",
+            "out of time",
         ];
         let mut cells = vec![heading.map(str::to_owned).to_vec()];
         cells.extend(rows.iter().map(|row| {
@@ -245,6 +259,7 @@ impl Row {
                 with_error(row.ep_length_mean, row.ep_length_sem, 1),
                 with_error(row.dead_allies_mean, row.dead_allies_sem, 2),
                 with_error(row.dead_enemies_mean, row.dead_enemies_sem, 2),
+                with_error(row.timed_out_mean, row.timed_out_sem, 3),
             ]
         }));
         output::table(&cells)
@@ -263,7 +278,7 @@ mod tests {
     fn a_mean_and_its_error_are_those_of_the_textbook() {
         let mut sums = Sums::default();
         for value in [1.0, 2.0, 6.0] {
-            sums.add([value; 5]);
+            sums.add([value; 6]);
         }
         let [mean, error] = sums.mean(2);
         assert!((mean - 3.0).abs() < 1e-12, "{mean}");

@@ -32,6 +32,7 @@ pub(crate) fn play_one(
         battle_won,
         dead_allies,
         dead_enemies,
+        timed_out,
     } = environment.battle_statistics();
     if args.json {
         return output::print_json(&serde_json::json!({
@@ -43,9 +44,10 @@ pub(crate) fn play_one(
             "ep_length": steps,
             "dead_allies": dead_allies,
             "dead_enemies": dead_enemies,
+            "timed_out": timed_out,
         }));
     }
-    let outcome = if battle_won { "won" } else { "not won" };
+    let outcome = output::outcome(battle_won, timed_out);
     output::print(&format!(
         "played: {} on StarCraft II by {}, {outcome} after {steps} steps, allies lost: {dead_allies}, enemies lost: {dead_enemies}\n",
         map.map(),

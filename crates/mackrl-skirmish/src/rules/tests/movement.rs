@@ -14,7 +14,7 @@ fn units_walk_at_the_speed_of_their_data() {
     arena.loops(8);
     assert!((arena.at(marine)[0] - 11.125).abs() < 1e-5, "2.25 a second");
     assert!(
-        (arena.at(stalker)[0] - 11.476_55).abs() < 1e-5,
+        (arena.at(stalker)[0] - 11.476_56).abs() < 1e-5,
         "2.9531 a second"
     );
     arena.loops(8);
@@ -55,11 +55,11 @@ fn walkers_go_round_whoever_is_fighting() {
 fn walkers_push_idle_friends_aside_but_not_enemies() {
     for (team, is_pushed) in [(Ally, true), (Enemy, false)] {
         let mut arena = Arena::new();
-        let idle = arena.add("marine", team, Passive, [12.0, 16.1]);
+        let idle = arena.add("marine", team, Passive, [12.0, 16.125]);
         let walker = arena.add("marine", Ally, Passive, [10.0, 16.0]);
         arena.battle.order(walker, Order::Move { to: [14.0, 16.0] });
         arena.loops(60);
-        assert_eq!(arena.at(idle) != [12.0, 16.1], is_pushed, "{team:?}");
+        assert_eq!(arena.at(idle) != [12.0, 16.125], is_pushed, "{team:?}");
         assert_eq!(arena.at(walker), [14.0, 16.0]);
     }
 }

@@ -15,8 +15,8 @@ fn passive_units_do_exactly_what_they_are_told() {
 
 #[test]
 fn aggressive_units_notice_what_comes_within_their_scan_range() {
-    // A zealot scans 5 from edge to edge: 5 + 0.5 + 0.375 against a marine.
-    for (distance, notices) in [(5.87, true), (5.89, false)] {
+    // A zealot notices at 5 and a margin of 0.9 from edge to edge: 5.9 + 0.5 + 0.375 against a marine.
+    for (distance, notices) in [(6.77, true), (6.78, false)] {
         let mut arena = Arena::new();
         let zealot = arena.add("zealot", Enemy, Aggressive, [10.0, 16.0]);
         arena.add("marine", Ally, Passive, [10.0 + distance, 16.0]);
@@ -50,20 +50,21 @@ fn an_attack_move_goes_to_its_point_and_fights_on_the_way() {
 #[test]
 fn a_unit_hit_from_afar_turns_on_its_attacker_and_calls_its_friends() {
     let mut arena = Arena::new();
-    let stalker = arena.add("stalker", Ally, Passive, [10.0, 16.0]);
-    let victim = arena.add("zealot", Enemy, Aggressive, [17.1, 16.0]);
-    let near = arena.add("zealot", Enemy, Aggressive, [17.1, 19.9]);
-    let far = arena.add("zealot", Enemy, Aggressive, [17.1, 20.7]);
-    arena.attack(stalker, victim);
+    // Its reach of 7 is farther than zealots notice.
+    let crawler = arena.add("spine-crawler", Ally, Passive, [10.0, 16.0]);
+    let victim = arena.add("zealot", Enemy, Aggressive, [18.2, 16.0]);
+    let near = arena.add("zealot", Enemy, Aggressive, [18.2, 19.9]);
+    let far = arena.add("zealot", Enemy, Aggressive, [18.2, 20.7]);
+    arena.attack(crawler, victim);
     arena.loops_until(|state| state.units[usize::from(victim)].shield < 50.0);
     assert_eq!(
         arena.unit(victim).quarry,
-        Some(stalker),
-        "7.1 is beyond its scan range of 6.125"
+        Some(crawler),
+        "8.2 is beyond the 7.275 in which it notices"
     );
     assert_eq!(
         arena.unit(near).quarry,
-        Some(stalker),
+        Some(crawler),
         "within 4 of the victim"
     );
     assert_eq!(arena.unit(far).quarry, None, "beyond 4");
@@ -146,7 +147,8 @@ fn of_two_targets_equally_near_it_is_the_southern_one() {
 #[test]
 fn a_unit_calls_for_help_every_two_seconds() {
     let mut arena = Arena::new();
-    let victim = arena.add("spine-crawler", Enemy, Aggressive, [20.0, 16.0]);
+    // One that shoots back would have the support of its friends, called or not.
+    let victim = arena.add("spine-crawler", Enemy, Passive, [20.0, 16.0]);
     let stalker = arena.add("stalker", Ally, Passive, [20.0, 7.5]);
     arena.attack(stalker, victim);
     arena.loops_until(|state| state.units[0].life < 300.0);

@@ -111,7 +111,6 @@ fn a_mirrored_start_gives_a_mirrored_battle() {
             .battle
             .order(u8::try_from(index).unwrap(), Order::AttackMove { to });
     }
-    // Rounding differs on the two sides of the map and grows once units jostle; ten seconds of march and battle are compared.
     for number in 0..160 {
         arena.loops(1);
         let state = &arena.battle.state;
@@ -123,11 +122,10 @@ fn a_mirrored_start_gives_a_mirrored_battle() {
                 (other.life, other.shield),
                 "loop {number}, {left}"
             );
-            let gap = (state.x[left] + state.x[right] - 32.0).abs()
-                + (state.y[left] - state.y[right]).abs();
-            assert!(
-                gap < 0.01,
-                "loop {number}: unit {left} is off its mirror image by {gap}"
+            assert_eq!(
+                [32.0 - state.x[left], state.y[left]],
+                [state.x[right], state.y[right]],
+                "loop {number}: unit {left} is off its mirror image"
             );
         }
     }
