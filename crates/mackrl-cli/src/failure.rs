@@ -197,7 +197,7 @@ fn of_run(error: &RunError) -> Verdict {
         RunError::NotARun { .. } => (
             Exit::Usage,
             Some(
-                "give the folder that `mackrl train` wrote, such as runs/3m-mackrl-seed1"
+                "give the folder that `mackrl train` wrote, such as runs/3m-mackrl-ppo-seed1"
                     .to_owned(),
             ),
         ),

@@ -37,7 +37,7 @@ pub(crate) struct TrainArgs {
 /// Starts at the latest intact checkpoint, whatever stopped the run: a signal, a kill, a full disk, a loss of power. Weights,
 /// checkpoints and metrics (those under sys/ aside) become those of an uninterrupted run, on any number of threads.
 ///
-/// Example: mackrl resume runs/3m-mackrl-seed1
+/// Example: mackrl resume runs/3m-mackrl-ppo-seed1
 #[derive(Debug, Args)]
 pub(crate) struct ResumeArgs {
     /// Run folder that `mackrl train` wrote
@@ -61,7 +61,7 @@ pub(crate) struct ResumeArgs {
 /// Prints the mean and the standard error of battles won, return and episode length. --save-replays keeps some of the episodes,
 /// with all that the controllers computed; `mackrl replay` and `mackrl explain` show them.
 ///
-/// Example: mackrl evaluate runs/3m-mackrl-seed1 --episodes 320 --save-replays 3 --json
+/// Example: mackrl evaluate runs/3m-mackrl-ppo-seed1 --episodes 320 --save-replays 3 --json
 #[derive(Debug, Args)]
 pub(crate) struct EvaluateArgs {
     /// Run folder that `mackrl train` wrote
@@ -95,7 +95,7 @@ pub(crate) struct EvaluateArgs {
 /// repeats the central run in worlds in which everything that an agent does not see is replaced by noise, and demands that
 /// its actions stay the same. Exit code 1 and the first counter-example if anything differs.
 ///
-/// Example: mackrl certify runs/3m-mackrl-seed1 --episodes 100 --json
+/// Example: mackrl certify runs/3m-mackrl-ppo-seed1 --episodes 100 --json
 #[derive(Debug, Args)]
 pub(crate) struct CertifyArgs {
     /// Run folder that `mackrl train` wrote

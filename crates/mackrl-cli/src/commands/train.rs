@@ -20,7 +20,7 @@ pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<()> {
     let world = sc2::world(&config)?;
     let threads = args.threads.count();
     let mut progress = RunProgress::new();
-    progress.announce(InstructionSet::chosen()?, threads);
+    progress.announce(&config, InstructionSet::chosen()?, threads);
     let summary = training_loop::train(&path, &config, &world, threads, &stop, &mut progress)?;
     print(&summary, args.json)
 }
@@ -60,7 +60,7 @@ mod tests {
     fn a_run_is_named_after_what_makes_it_different() {
         assert_eq!(
             default_folder(&Config::default()),
-            Path::new("runs/3m-mackrl-seed1")
+            Path::new("runs/3m-mackrl-ppo-seed1")
         );
     }
 }

@@ -1,7 +1,10 @@
 //! One run that is being trained.
 
 use mackrl::nn::InstructionSet;
-use mackrl_run::training_loop::{Observer, Standing};
+use mackrl_run::{
+    config::Config,
+    training_loop::{Observer, Standing},
+};
 
 use super::{Lines, rate_and_rest};
 use crate::failure::printable;
@@ -25,10 +28,12 @@ impl RunProgress {
         }
     }
 
-    /// Tells what a run computes with, before it begins.
-    pub(crate) fn announce(&self, instructions: InstructionSet, threads: usize) {
+    /// Tells what learns and what it is computed with, before a run begins.
+    pub(crate) fn announce(&self, config: &Config, instructions: InstructionSet, threads: usize) {
         let s = if threads == 1 { "" } else { "s" };
-        let text = format!("computing with {instructions} on {threads} thread{s}");
+        let (algorithm, world) = (config.algorithm.name(), printable(config.env.map()));
+        let text =
+            format!("{algorithm} on {world}, computing with {instructions} on {threads} thread{s}");
         self.lines.note(&text);
     }
 

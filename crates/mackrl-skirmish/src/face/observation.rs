@@ -159,6 +159,10 @@ impl Scene<'_> {
             let can_shoot = self.write_enemy((agent, index), can_heal, &mut row, &mut seen);
             available_a[TARGETS_FROM + enemy] = can_heal.unwrap_or(can_shoot);
         }
+        let beyond = TARGETS_FROM + self.layout.enemies;
+        for (number, available) in available_a[beyond..].iter_mut().enumerate() {
+            *available = self.can_aim(agent, self.layout.enemies + number);
+        }
         for ally in (0..self.layout.agents).filter(|ally| *ally != agent) {
             self.write_ally(agent, ally, &mut row, &mut seen);
         }

@@ -49,7 +49,7 @@ struct Wish {
 }
 
 /// Gap to an obstacle, in map units, at which a walker begins to step round it. With 0.5 a walker sees only the neighbour that it
-/// runs into, and rows of fighters hold up those behind: 25 marines then take 2 steps longer.
+/// runs into: stalkers and zealots then surround a team that stands sooner, in 42.6 steps, 42.9 here and 43.1 in recorded runs.
 pub(super) const LOOKAHEAD: f32 = 2.0;
 /// Cosine of the greatest turn round obstacles, 105°. Walkers that turn back further, up to 127°, run about behind their own
 /// front: 24 zerglings take 4 steps longer; with 90° stalkers and zealots surround a team that stands a step too soon.

@@ -13,7 +13,7 @@ const SUPPORT_RADIUS: f32 = 4.0;
 /// Loops between two looks for a quarry. With 4 and more 25 marines at random do more damage than in recorded runs.
 const RESCAN_LOOPS: f32 = 2.0;
 /// Map units beyond the scan range of the data in which units notice targets. With 0.4 enemies walk past agents that the game's
-/// enemies find, and random play with 25 marines lasts 42 steps where the game's lasts 37; with more than 1.1 they find teams that
+/// enemies find, and random play with 25 marines lasts 41 steps where the game's lasts 37; with more than 1.1 they find teams that
 /// hide at the northern edge of 3m, which 57 of 144 such teams of recorded runs did unfound.
 const NOTICE_MARGIN: f32 = 0.9;
 /// Difference of squared distances, in squared map units, below which two targets are equally near.

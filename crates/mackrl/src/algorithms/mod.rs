@@ -7,6 +7,7 @@
 mod actor_critic;
 mod central_v;
 mod mackrl;
+mod ppo;
 mod state;
 
 use std::{fmt::Debug, sync::Arc};
@@ -19,6 +20,9 @@ use mackrl_env::{
 pub use actor_critic::{ActorCritic, ActorCriticSettings, OptimiserName};
 pub use central_v::CentralV;
 pub use mackrl::{Levels, Mackrl, MackrlSettings, PartitionChoice};
+pub use ppo::{
+    Groups, Ippo, MackrlPpo, MackrlPpoSettings, Mappo, PairMemory, Ppo, PpoSettings, Sight,
+};
 pub use state::{AlgorithmState, StoredState};
 
 use crate::{
@@ -178,7 +182,13 @@ pub struct Preset {
 /// The algorithms of this crate, the recommended one first.
 #[must_use]
 pub fn built_in() -> Vec<Arc<dyn AlgorithmKind>> {
-    vec![Arc::new(Mackrl), Arc::new(CentralV)]
+    vec![
+        Arc::new(MackrlPpo),
+        Arc::new(Mappo::default()),
+        Arc::new(Ippo::default()),
+        Arc::new(Mackrl),
+        Arc::new(CentralV),
+    ]
 }
 
 #[cfg(test)]

@@ -1,11 +1,14 @@
-//! What judges: V(state, last actions), and what it learns from.
+//! What judges, and what it learns from: V(state, last actions) of the team, or a value of each member that reads what the member
+//! sees as well.
 //!
-//! The critic is central: it sees the state, which holds the last actions of all agents. It is needed for learning alone,
+//! A critic may be central and see the state, which holds the last actions of all agents. It is needed for learning alone,
 //! so it takes nothing away from decentralised execution.
 
 mod central;
+mod team;
 
 pub use central::{CentralCritic, CriticMinibatch, CriticReport, CriticSettings, CriticState};
+pub use team::{ReturnScale, TeamCritic, TeamCriticSettings, ValueInputs};
 
 /// What the names of the critic's parameters begin with.
 const CRITIC: &str = "critic";

@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use crate::policy::Recording;
+use crate::{nn::BEGINS, policy::Recording};
 
 /// No row.
 const ABSENT: usize = usize::MAX;
@@ -38,6 +38,8 @@ pub struct Rows {
     groups: usize,
     /// Whether only some rows are asked for a choice at a step.
     selective: bool,
+    /// Whether rows may join after the first step.
+    joining: bool,
     recording: Recording,
     steps_begun: usize,
     steps: Vec<StepRows>,
@@ -63,6 +65,7 @@ impl Rows {
             columns,
             groups,
             selective,
+            joining: false,
             recording: Recording::Off,
             steps_begun: 0,
             steps: Vec::new(),
@@ -75,6 +78,13 @@ impl Rows {
             previous_row_of: Vec::new(),
             place_of: Vec::new(),
         }
+    }
+
+    /// The same room for a bank whose rows may come and go: one that was not there at the step before begins anew.
+    #[must_use]
+    pub const fn that_may_join(mut self) -> Self {
+        self.joining = true;
+        self
     }
 
     /// F: length of a row of inputs.
@@ -131,7 +141,7 @@ impl Rows {
         &self.instance_r[step.rows.clone()]
     }
 
-    /// For each row of a step, the row of the step before that it continues.
+    /// For each row of a step, the row of the step before that it continues, or [`BEGINS`].
     #[must_use]
     pub fn carry_of(&self, step: &StepRows) -> &[usize] {
         &self.carry_r[step.rows.clone()]
@@ -162,8 +172,8 @@ impl Rows {
     }
 
     /// Begins a step with one row for each of `instances`, ascending; its inputs are zero and its masks all false until they are
-    /// written. An instance that was there before goes on where it was; after the first step, none joins. `is_asked` says
-    /// which are asked for a choice, if the bank is selective.
+    /// written. An instance that was there before goes on where it was; after the first step, none joins unless they may. `is_asked`
+    /// says which are asked for a choice, if the bank is selective.
     ///
     /// # Panics
     /// If an instance joins after the first step.
@@ -189,10 +199,14 @@ impl Rows {
             self.row_of[number] = row;
             let before = self.previous_row_of.get(number).copied().unwrap_or(ABSENT);
             assert!(
-                is_first || before != ABSENT,
+                is_first || self.joining || before != ABSENT,
                 "no controller joins after the first step of an episode"
             );
-            self.carry_r.push(if is_first { row } else { before });
+            self.carry_r.push(match before {
+                _ if is_first => row,
+                ABSENT => BEGINS,
+                before => before,
+            });
             self.instance_r.push(instance);
             let asked = !self.selective || is_asked(instance);
             self.place_of.push(if asked {
@@ -330,6 +344,20 @@ mod tests {
             (rows.steps_begun(), rows.carry_of(rows.latest())),
             (3, &[1][..])
         );
+    }
+
+    #[test]
+    fn rows_that_may_join_begin_anew_where_they_were_not_before() {
+        let mut rows = Rows::new([5, 2, 3], false).that_may_join();
+        rows.begin(Recording::ForLearning);
+        for groups in [&[0, 1][..], &[1, 4], &[0, 4], &[0, 4]] {
+            step(&mut rows, groups, &[]);
+        }
+        let carries = rows.steps().iter().map(|step| rows.carry_of(step).to_vec());
+        let expected = [[0, 1], [1, BEGINS], [BEGINS, 1], [0, 1]].map(|carry| carry.to_vec());
+        assert_eq!(carries.collect::<Vec<_>>(), expected);
+        let unchanged: Vec<_> = rows.steps().iter().map(|step| step.unchanged).collect();
+        assert_eq!(unchanged, [true, false, false, true]);
     }
 
     #[test]

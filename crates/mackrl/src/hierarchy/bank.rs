@@ -5,16 +5,21 @@ use std::sync::Arc;
 use mackrl_env::{Action, AgentId, EnvironmentSpec, KnownEntities, LocalView, PriorKnowledge};
 
 use crate::{
-    common_knowledge::{CommonKnowledgeFeatures, GroupEncoder, joint_mask},
+    common_knowledge::{GroupEncoder, joint_mask},
     experience::Rows,
-    nn::{NetworkSizes, ParameterLayout, RecurrentNetwork},
-    policy::{Delegation, Level, Reads},
+    hierarchy::{HierarchySettings, NetworkStyle},
+    nn::{NetworkSizes, ParameterLayout, RecurrentNetwork, normalise_rows},
+    policy::{Delegation, Level, Memory, Reads},
 };
 
 /// The network of a level and the encoding of its inputs.
 #[derive(Debug, Clone)]
 pub(crate) struct Bank {
     pub(crate) network: RecurrentNetwork,
+    /// Whether inputs are normalised.
+    normalises: bool,
+    /// Whether rows may join after the first step.
+    joining: bool,
     /// Of a level that reads common knowledge.
     encoder: Option<GroupEncoder>,
     agents: usize,
@@ -28,9 +33,9 @@ impl Bank {
         level: &Level,
         spec: &EnvironmentSpec,
         prior: &Arc<dyn PriorKnowledge>,
-        features: CommonKnowledgeFeatures,
-        hidden: usize,
+        settings: HierarchySettings,
     ) -> Self {
+        let (features, hidden) = (settings.common_knowledge, settings.hidden);
         let encoder = (level.reads != Reads::OwnObservation)
             .then(|| GroupEncoder::new(features, level.size(), spec, Arc::clone(prior)));
         let encoded = encoder.as_ref().map_or(0, GroupEncoder::size);
@@ -44,8 +49,15 @@ impl Bank {
             hidden,
             outputs: level.columns(spec.actions),
         };
+        let mut network = RecurrentNetwork::new(layout, level.name, sizes);
+        let normalises = settings.networks != NetworkStyle::Plain;
+        if normalises {
+            network = network.with_normalised_features();
+        }
         Self {
-            network: RecurrentNetwork::new(layout, level.name, sizes),
+            network,
+            normalises,
+            joining: level.memory == Memory::WhileFormed,
             encoder,
             agents: spec.agents,
             observation_size: spec.observation_size,
@@ -55,7 +67,12 @@ impl Bank {
     /// Room for what the bank reads.
     pub(crate) fn rows(&self, groups: usize, selective: bool) -> Rows {
         let sizes = self.network.sizes();
-        Rows::new([groups, sizes.inputs, sizes.outputs], selective)
+        let rows = Rows::new([groups, sizes.inputs, sizes.outputs], selective);
+        if self.joining {
+            rows.that_may_join()
+        } else {
+            rows
+        }
     }
 
     /// Writes the row of a group that reads common knowledge: what it commonly knows and who its members are, and, if it is
@@ -81,6 +98,7 @@ impl Bank {
         if level.reads == Reads::CommonKnowledgeAndMembers {
             write_identities(identities, self.agents, members);
         }
+        self.normalise(input);
         let Some(mask) = mask else {
             return;
         };
@@ -110,8 +128,18 @@ impl Bank {
         observation.copy_from_slice(view.observation());
         write_one_hot(identity, Some(view.agent().index()));
         write_one_hot(previous, last_action.map(Action::index));
+        self.normalise(input);
         if let Some(mask) = mask {
             mask.copy_from_slice(view.available());
+        }
+    }
+}
+
+impl Bank {
+    /// Normalises a row, if the networks are of that style.
+    fn normalise(&self, input: &mut [f32]) {
+        if self.normalises {
+            normalise_rows(input.len(), input);
         }
     }
 }

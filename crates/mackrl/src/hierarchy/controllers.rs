@@ -19,7 +19,7 @@ use crate::{
     NotFinite, Phase, Stopwatch,
     experience::{Experience, Instance, Rows, StepRows},
     nn::first_not_finite,
-    policy::{ControllerId, ControllerInput, Parameters, Part, Reads, Recording, TEAM},
+    policy::{ControllerId, ControllerInput, Memory, Parameters, Part, Reads, Recording, TEAM},
 };
 
 /// The controllers of a few environments, or of one agent.
@@ -166,9 +166,12 @@ impl Controllers {
         let groups = &groups[place];
         let instances = playing.iter().flat_map(|&environment| {
             let table = &tables[environment];
+            let forms = move |group: usize| {
+                level.memory == Memory::Episode || table.possible_g[place][group]
+            };
             let chosen = groups
                 .iter()
-                .filter(move |group| table.has_choice(level, **group));
+                .filter(move |group| table.has_choice(level, **group) && forms(**group));
             chosen.map(move |&group| Instance { environment, group })
         });
         rows.begin_step(instances, |instance| {
@@ -217,9 +220,13 @@ impl Controllers {
     }
 }
 
-/// Whether only some groups of a level are asked at a step: where divisions take turns, all but the team and single agents.
+/// Whether only some groups of a level are asked at a step: where divisions take turns, all but the team and single agents,
+/// and those that only have a row while they are formed.
 fn is_selective(parts: &Parts, level: usize) -> bool {
-    !parts.declaration.is_fixed() && level != TEAM && level != parts.declaration.alone()
+    parts.declaration.levels()[level].memory == Memory::Episode
+        && !parts.declaration.is_fixed()
+        && level != TEAM
+        && level != parts.declaration.alone()
 }
 
 /// The rows of one environment among a step's, which are ascending.

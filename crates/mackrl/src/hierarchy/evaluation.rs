@@ -38,13 +38,7 @@ impl Hierarchy {
         parameters: &Parameters,
         piece: &'a mut Piece,
     ) -> Result<(&'a Experience, &'a mut Activations), Error> {
-        let Piece { experience, actor } = piece;
-        let kept = actor
-            .cache()
-            .and_then(|cache| cache.downcast_mut::<Activations>());
-        let activations = kept.ok_or_else(|| {
-            Error::Data("an experience was left by another kind of policy".to_owned())
-        })?;
+        let (experience, activations) = kept(piece)?;
         if !activations.serve(parameters.version()) {
             self.recompute(parameters, experience, activations);
         }
@@ -157,6 +151,18 @@ impl Hierarchy {
                 .backward(weights, rows.input_rf(), &mut own.trace, gradient);
         }
     }
+}
+
+/// The piece's experience, and what its actor kept of it.
+pub(super) fn kept(piece: &mut Piece) -> Result<(&Experience, &mut Activations), Error> {
+    let Piece { experience, actor } = piece;
+    let kept = actor
+        .cache()
+        .and_then(|cache| cache.downcast_mut::<Activations>());
+    let activations = kept.ok_or_else(|| {
+        Error::Data("an experience was left by another kind of policy".to_owned())
+    })?;
+    Ok((experience, activations))
 }
 
 impl BankActivations {

@@ -63,6 +63,7 @@ impl Executor for AgentExecutor {
             return forced_action(view);
         }
         let parts = Arc::clone(&self.controllers.parts);
+        self.controllers.tables[0].note_possible(&parts, key, step);
         let moment = StepContext {
             step,
             playing: &[0],

@@ -21,6 +21,8 @@ mod bank;
 mod controllers;
 mod evaluation;
 mod executor;
+mod factors;
+mod health;
 mod perspective;
 mod statistics;
 mod tables;
@@ -30,7 +32,10 @@ use std::sync::Arc;
 
 use mackrl_env::{AgentId, EnvironmentSpec, EpisodeKey, PriorKnowledge, Stream};
 
-pub use self::activations::Activations;
+pub use self::{
+    activations::Activations,
+    factors::{Factor, FactorWorkspace, Weighing},
+};
 use self::{actor::TeamActor, bank::Bank, executor::AgentExecutor};
 use crate::{
     common_knowledge::CommonKnowledgeFeatures,
@@ -39,12 +44,30 @@ use crate::{
 };
 
 /// What the controllers of a hierarchy are made of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HierarchySettings {
     /// What controllers read of common knowledge.
     pub common_knowledge: CommonKnowledgeFeatures,
     /// H: width of the hidden layers and of the recurrent state, at least 1.
     pub hidden: usize,
+    /// How networks are made.
+    pub networks: NetworkStyle,
+}
+
+/// How the networks of a hierarchy are made.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub enum NetworkStyle {
+    /// As the paper's: nothing is normalised, and initial parameters are uniform as PyTorch draws them.
+    #[default]
+    Plain,
+    /// As those that learn under a clipped surrogate: inputs and features are normalised row by row, initial weights are
+    /// orthogonal, and the first logits close to each other.
+    Normalised {
+        /// What the orthogonal weights of the last layers are multiplied by.
+        gain: f64,
+        /// The initial logit of dividing, for groups that act jointly or divide in one way.
+        delegation_logit: f64,
+    },
 }
 
 /// A declared hierarchy with its networks: the policy of a team.
@@ -60,6 +83,7 @@ pub(crate) struct Parts {
     pub(crate) prior: Arc<dyn PriorKnowledge>,
     pub(crate) declaration: Declaration,
     pub(crate) layout: ParameterLayout,
+    pub(crate) style: NetworkStyle,
     /// Of each level; nothing where there is no choice, or all choices are equally likely.
     pub(crate) banks: Vec<Option<Bank>>,
 }
@@ -85,9 +109,8 @@ impl Hierarchy {
             "the declared team is that of the world"
         );
         let mut layout = ParameterLayout::new();
-        let features = settings.common_knowledge;
         let banks = declaration.levels().iter().map(|level| {
-            let bank = || Bank::new(&mut layout, level, spec, prior, features, settings.hidden);
+            let bank = || Bank::new(&mut layout, level, spec, prior, settings);
             level.is_learned().then(bank)
         });
         let banks = banks.collect();
@@ -97,6 +120,7 @@ impl Hierarchy {
                 prior: Arc::clone(prior),
                 declaration,
                 layout,
+                style: settings.networks,
                 banks,
             }),
         }
@@ -137,8 +161,25 @@ impl Policy for Hierarchy {
     fn initialise(&self, seed: u64) -> Vec<f32> {
         let key = EpisodeKey::new(seed, Stream::Other, 0);
         let mut parameters = vec![0.0; self.parts.layout.len()];
-        for bank in self.parts.banks.iter().flatten() {
-            bank.network.initialise(&key, &mut parameters);
+        let levels = self.parts.declaration.levels().iter();
+        for (level, bank) in levels.zip(&self.parts.banks) {
+            let Some(bank) = bank else {
+                continue;
+            };
+            match self.parts.style {
+                NetworkStyle::Plain => bank.network.initialise(&key, &mut parameters),
+                NetworkStyle::Normalised {
+                    gain,
+                    delegation_logit,
+                } => {
+                    let network = &bank.network;
+                    network.initialise_orthogonally(&key, gain, &mut parameters);
+                    if level.acts.is_some() && level.divisions == 1 {
+                        let divide = network.logit_biases().start;
+                        parameters[divide] = crate::Real::from_f64(delegation_logit);
+                    }
+                }
+            }
         }
         parameters
     }

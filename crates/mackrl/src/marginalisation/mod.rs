@@ -10,6 +10,7 @@
 
 mod gradient;
 mod logarithm;
+pub mod pair;
 pub mod pairwise;
 pub mod recursive;
 pub mod reference;

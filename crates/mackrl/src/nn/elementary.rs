@@ -65,6 +65,26 @@ pub(crate) fn exponentials<E: Element>(x: &[E], result: &mut [E]) {
     E::dispatch(Exponentials { x, result });
 }
 
+/// ln of every number in its place, all positive and normal.
+pub(crate) fn logarithms<E: Element>(values: &mut [E]) {
+    E::dispatch(Logarithms { values });
+}
+
+struct Logarithms<'a, E> {
+    values: &'a mut [E],
+}
+
+impl<E: Element> Kernel<E> for Logarithms<'_, E> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes<Element = E>>(self, lanes: L) {
+        for part in self.values.chunks_mut(L::LANES) {
+            lanes.store(part, lanes.ln(lanes.load(part)));
+        }
+    }
+}
+
 struct Exponentials<'a, E> {
     x: &'a [E],
     result: &'a mut [E],

@@ -13,7 +13,7 @@ use crate::{
         aligned::Aligned,
         gates::{Activate, Differentiate, GATES},
         lanes::Element,
-        parameters::{ParameterLayout, fill_uniform},
+        parameters::{ParameterLayout, fill_orthogonal, fill_uniform},
         product::{Packed, Product, Rows, Start},
         weight_gradient::{ColumnSums, WeightGradient},
     },
@@ -80,6 +80,19 @@ impl Gru {
         ] {
             fill_uniform(key, range.clone(), bound, parameters);
         }
+    }
+
+    /// Draws orthogonal weights, those of all gates together; biases are 0.
+    pub(crate) fn initialise_orthogonally<R: Real>(&self, key: &EpisodeKey, parameters: &mut [R]) {
+        for (range, inputs) in [
+            (&self.weight_ih, self.inputs),
+            (&self.weight_hh, self.hidden),
+        ] {
+            let shape = [inputs, 3 * self.hidden];
+            fill_orthogonal(key, range.clone(), shape, 1.0, parameters);
+        }
+        parameters[self.bias_ih.clone()].fill(R::ZERO);
+        parameters[self.bias_hh.clone()].fill(R::ZERO);
     }
 
     /// Copies the parameters into the orders that the forward pass reads.

@@ -9,7 +9,7 @@ use crate::{
     nn::{
         aligned::Aligned,
         lanes::Element,
-        parameters::{ParameterLayout, fill_uniform},
+        parameters::{ParameterLayout, fill_orthogonal, fill_uniform},
         product::{Packed, Product, Rows, Start},
         weight_gradient::{ColumnSums, WeightGradient},
     },
@@ -50,6 +50,23 @@ impl Linear {
         let bound = 1.0 / (self.inputs as f64).sqrt();
         fill_uniform(key, self.weight.clone(), bound, parameters);
         fill_uniform(key, self.bias.clone(), bound, parameters);
+    }
+
+    /// Draws an orthogonal weight times `gain`; the bias is 0.
+    pub(crate) fn initialise_orthogonally<R: Real>(
+        &self,
+        key: &EpisodeKey,
+        gain: f64,
+        parameters: &mut [R],
+    ) {
+        let shape = [self.inputs, self.outputs];
+        fill_orthogonal(key, self.weight.clone(), shape, gain, parameters);
+        parameters[self.bias.clone()].fill(R::ZERO);
+    }
+
+    /// Where the biases stand in the flat vector.
+    pub(crate) fn bias(&self) -> Range<usize> {
+        self.bias.clone()
     }
 
     /// Copies the parameters into the order that the forward pass reads.

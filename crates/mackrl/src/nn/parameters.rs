@@ -141,6 +141,50 @@ pub(crate) fn fill_uniform<R: Real>(
     }
 }
 
+/// Fills a matrix [rows, columns] with `gain` times a random orthogonal one (Saxe and others, 2014): its rows, or its columns
+/// where there are fewer, are orthonormal.
+///
+/// Normal vectors, orthogonalised one after the other in double precision: the directions are uniform.
+pub(crate) fn fill_orthogonal<R: Real>(
+    key: &EpisodeKey,
+    range: Range<usize>,
+    [rows, columns]: [usize; 2],
+    gain: f64,
+    parameters: &mut [R],
+) {
+    assert_eq!(range.len(), rows * columns, "the matrix fills its place");
+    let (count, length) = (rows.min(columns), rows.max(columns));
+    let mut vectors: Vec<Vec<f64>> = Vec::with_capacity(count);
+    for i in 0..count {
+        let number = |j| key.normal(0, Draw::Setup(range.start + i * length + j));
+        let mut vector: Vec<f64> = (0..length).map(number).collect();
+        // Twice, because what rounding leaves of other directions is large where little is left of the vector.
+        for _ in 0..2 {
+            for other in &vectors {
+                let along = dot(&vector, other);
+                let parts = vector.iter_mut().zip(other);
+                parts.for_each(|(x, y)| *x -= along * y);
+            }
+        }
+        let norm = dot(&vector, &vector).sqrt();
+        vector.iter_mut().for_each(|x| *x /= norm);
+        vectors.push(vector);
+    }
+    for (place, value) in parameters[range].iter_mut().enumerate() {
+        let (row, column) = (place / columns, place % columns);
+        let entry = if rows <= columns {
+            vectors[row][column]
+        } else {
+            vectors[column][row]
+        };
+        *value = R::from_f64(gain * entry);
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -150,6 +194,32 @@ mod tests {
         layout.add("a.weight", &[2, 3]);
         layout.add("a.bias", &[2]);
         layout
+    }
+
+    #[test]
+    fn an_orthogonal_matrix_has_orthonormal_rows_or_columns() {
+        let key = EpisodeKey::new(3, mackrl_env::Stream::Other, 0);
+        for [rows, columns] in [[3, 7], [7, 3], [5, 5]] {
+            let mut matrix = vec![0.0_f64; rows * columns];
+            fill_orthogonal(&key, 0..rows * columns, [rows, columns], 2.0, &mut matrix);
+            let (count, length) = (rows.min(columns), rows.max(columns));
+            let vector = |i: usize| -> Vec<f64> {
+                let at = |j| {
+                    if rows <= columns {
+                        i * columns + j
+                    } else {
+                        j * columns + i
+                    }
+                };
+                (0..length).map(|j| matrix[at(j)]).collect()
+            };
+            for i in 0..count {
+                for j in 0..count {
+                    let expected = if i == j { 4.0 } else { 0.0 };
+                    assert!((dot(&vector(i), &vector(j)) - expected).abs() < 1e-12);
+                }
+            }
+        }
     }
 
     #[test]

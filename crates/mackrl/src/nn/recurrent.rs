@@ -10,6 +10,7 @@ use crate::{
         gates::GATES,
         gru::{Gru, GruWeights},
         lanes::{Element, Kernel, Lanes},
+        layer_norm::{KEPT, RectifyNormalise, RectifyNormaliseGradient},
         linear::{Linear, LinearWeights},
         parameters::ParameterLayout,
         trace::{Step, Trace, Workspace},
@@ -39,6 +40,8 @@ pub struct RecurrentNetwork {
     input: Linear,
     gru: Gru,
     output: Linear,
+    /// Whether features are normalised.
+    normalises: bool,
 }
 
 /// The weights of a [`RecurrentNetwork`] as its kernels read them: copied from the flat vector once per update.
@@ -61,7 +64,15 @@ impl RecurrentNetwork {
             input: Linear::new(layout, &format!("{name}.input"), inputs, hidden),
             gru: Gru::new(layout, &format!("{name}.gru"), hidden, hidden),
             output: Linear::new(layout, &format!("{name}.output"), hidden, outputs),
+            normalises: false,
         }
+    }
+
+    /// The same network with its features, the output of the first layer, normalised row by row after `ReLU`.
+    #[must_use]
+    pub const fn with_normalised_features(mut self) -> Self {
+        self.normalises = true;
+        self
     }
 
     /// The sizes it was made with.
@@ -80,6 +91,25 @@ impl RecurrentNetwork {
         self.input.initialise(key, parameters);
         self.gru.initialise(key, parameters);
         self.output.initialise(key, parameters);
+    }
+
+    /// Draws orthogonal weights: times √2 before `ReLU`, times `gain` in the last layer; biases are 0.
+    pub fn initialise_orthogonally<R: Real>(
+        &self,
+        key: &EpisodeKey,
+        gain: f64,
+        parameters: &mut [R],
+    ) {
+        self.input
+            .initialise_orthogonally(key, std::f64::consts::SQRT_2, parameters);
+        self.gru.initialise_orthogonally(key, parameters);
+        self.output.initialise_orthogonally(key, gain, parameters);
+    }
+
+    /// Where the biases of the logits stand in the flat vector.
+    #[must_use]
+    pub fn logit_biases(&self) -> Range<usize> {
+        self.output.bias()
     }
 
     /// Prepares the weights for [`step`](Self::step) and [`backward`](Self::backward).
@@ -127,7 +157,17 @@ impl RecurrentNetwork {
         }
         let features = &mut trace.features.as_mut_slice()[first * hidden..][..rows * hidden];
         self.input.forward(&weights.input, rows, x, features);
-        E::dispatch(Rectify { values: features });
+        if self.normalises {
+            E::dispatch(RectifyNormalise {
+                columns: hidden,
+                values: &mut *features,
+                kept: &mut trace.norms.as_mut_slice()[first * KEPT..][..rows * KEPT],
+            });
+        } else {
+            E::dispatch(Rectify {
+                values: &mut *features,
+            });
+        }
         let next = &mut trace.hidden.as_mut_slice()[first * hidden..];
         self.gru.forward(
             &weights.gru,
@@ -244,10 +284,19 @@ impl RecurrentNetwork {
         self.gru
             .input_gradient(&weights.gru, rows, gates, features_gradient);
         let features = &trace.features.as_slice()[first * hidden..][..rows * hidden];
-        E::dispatch(RectifyGradient {
-            values: features,
-            gradient: features_gradient,
-        });
+        if self.normalises {
+            E::dispatch(RectifyNormaliseGradient {
+                columns: hidden,
+                normalised: features,
+                kept: &trace.norms.as_slice()[first * KEPT..][..rows * KEPT],
+                gradient: features_gradient,
+            });
+        } else {
+            E::dispatch(RectifyGradient {
+                values: features,
+                gradient: features_gradient,
+            });
+        }
     }
 
     /// Adds what the logits of step `t` say to the gradient of its hidden state.

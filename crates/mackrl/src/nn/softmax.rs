@@ -182,7 +182,7 @@ fn raise<E: Element>(highest: &mut [E; BLOCK], numbers: &[E; BLOCK]) {
 
 /// The sum of a row in 16 parts, whatever the machine's width.
 #[inline(always)]
-fn row_sum<E: Element>(row: &[E]) -> E {
+pub(super) fn row_sum<E: Element>(row: &[E]) -> E {
     let mut sums = [E::ZERO; BLOCK];
     let (whole, last) = row.as_chunks::<BLOCK>();
     for part in whole {
@@ -198,7 +198,7 @@ fn row_sum<E: Element>(row: &[E]) -> E {
 
 /// Combines 16 numbers as a binary tree.
 #[inline(always)]
-fn tree<E: Element>(mut parts: [E; BLOCK], combine: impl Fn(E, E) -> E) -> E {
+pub(super) fn tree<E: Element>(mut parts: [E; BLOCK], combine: impl Fn(E, E) -> E) -> E {
     let mut half = BLOCK / 2;
     while half > 0 {
         for i in 0..half {

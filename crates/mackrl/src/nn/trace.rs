@@ -8,8 +8,11 @@ use std::ops::Range;
 
 use crate::{
     Real,
-    nn::{aligned::Aligned, gates::GATES, recurrent::NetworkSizes},
+    nn::{aligned::Aligned, gates::GATES, layer_norm::KEPT, recurrent::NetworkSizes},
 };
+
+/// Stands in place of the row to continue where a row begins with a hidden state of zero.
+pub const BEGINS: usize = usize::MAX;
 
 /// How much of an episode a [`Trace`] keeps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,6 +49,8 @@ pub struct Trace<R> {
     pub(crate) carry: Vec<usize>,
     /// [rows, hidden], the rectified output of the first layer.
     pub(crate) features: Aligned<R>,
+    /// [rows, 2], what normalised features keep for the backward pass.
+    pub(crate) norms: Aligned<R>,
     /// [rows, hidden], the hidden state that each row continues.
     pub(crate) previous: Aligned<R>,
     /// [rows, 4 hidden]
@@ -101,6 +106,7 @@ impl<R: Real> Trace<R> {
             steps: Vec::new(),
             carry: Vec::new(),
             features: Aligned::default(),
+            norms: Aligned::default(),
             previous: Aligned::default(),
             gates: Aligned::default(),
             hidden: Aligned::default(),
@@ -123,8 +129,8 @@ impl<R: Real> Trace<R> {
 
     /// Begins a step of `rows` rows.
     ///
-    /// Row i continues row `carry[i]` of the previous step, or row i where `carry` is `None`. The first step of an episode
-    /// has nothing to continue and ignores `carry`.
+    /// Row i continues row `carry[i]` of the previous step (or begins anew, where that is [`BEGINS`]), or row i where `carry` is
+    /// `None`. The first step of an episode has nothing to continue and ignores `carry`.
     ///
     /// # Panics
     /// If `carry` does not have one entry a row, or an entry (or, without `carry`, a row) that the previous step lacks.
@@ -149,7 +155,10 @@ impl<R: Real> Trace<R> {
                 Some(carry) => {
                     assert_eq!(carry.len(), rows, "one row to continue for each row");
                     for (state, &row) in states.chunks_exact_mut(h).zip(carry) {
-                        state.copy_from_slice(&last[row * h..][..h]);
+                        match row {
+                            BEGINS => state.fill(R::ZERO),
+                            row => state.copy_from_slice(&last[row * h..][..h]),
+                        }
                     }
                     self.carry.extend_from_slice(carry);
                 }
@@ -255,6 +264,26 @@ impl<R: Real> Trace<R> {
         &mut self.logits_gradient.as_mut_slice()[rows.start * outputs..rows.end * outputs]
     }
 
+    /// The hidden states of all steps that are kept [rows, hidden].
+    pub(crate) fn all_hidden(&self) -> &[R] {
+        let end = self.steps.last().map_or(0, |step| step.rows.end);
+        &self.hidden.as_slice()[..end * self.sizes.hidden]
+    }
+
+    /// The logits of all steps that are kept [rows of logits, outputs].
+    pub(crate) fn all_logits(&self) -> &[R] {
+        let end = self.steps.last().map_or(0, |step| step.asked.end);
+        &self.logits.as_slice()[..end * self.sizes.outputs]
+    }
+
+    /// The place for the gradient of all logits [rows of logits, outputs], as [`logits_gradient_mut`](Self::logits_gradient_mut)
+    /// gives it step by step.
+    pub(crate) fn all_logits_gradient_mut(&mut self) -> &mut [R] {
+        let end = self.steps.last().map_or(0, |step| step.asked.end) * self.sizes.outputs;
+        self.logits_gradient.grow(end);
+        &mut self.logits_gradient.as_mut_slice()[..end]
+    }
+
     /// The rows of the current step among all that are kept.
     pub(crate) fn last_rows(&self) -> Range<usize> {
         self.last_step().rows.clone()
@@ -281,6 +310,9 @@ impl<R: Real> Trace<R> {
         carried.fill(R::ZERO);
         let gradients = hidden_gradient.as_slice().chunks_exact(h);
         for (&row, gradient) in self.carry[self.steps[t].rows.clone()].iter().zip(gradients) {
+            if row == BEGINS {
+                continue;
+            }
             for (sum, &term) in carried[row * h..][..h].iter_mut().zip(gradient) {
                 *sum += term;
             }
@@ -300,6 +332,7 @@ impl<R: Real> Trace<R> {
     fn grow(&mut self, rows: usize) {
         let hidden = self.sizes.hidden;
         self.features.grow(rows * hidden);
+        self.norms.grow(rows * KEPT);
         self.previous.grow(rows * hidden);
         self.gates.grow(rows * GATES * hidden);
         self.hidden.grow(rows * hidden);

@@ -6,11 +6,15 @@
 //! parameters, in one place, for every objective alike.
 
 mod average;
+mod clipped_surrogate;
 mod entropy_regularised;
 mod policy_gradient;
 mod returns;
+mod value_loss;
 
 pub use average::LossAverage;
+pub use clipped_surrogate::{Surrogate, clipped_surrogate};
 pub use entropy_regularised::entropy_regularised;
 pub use policy_gradient::policy_gradient;
 pub use returns::{ReturnSettings, generalised_advantages, lambda_returns};
+pub use value_loss::ValueLoss;

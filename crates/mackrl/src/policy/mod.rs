@@ -18,8 +18,8 @@ use mackrl_env::{Action, AgentId, EpisodeKey, LocalView, Observations};
 use serde::{Deserialize, Serialize};
 
 pub use declaration::{
-    Declaration, Delegation, Division, DivisionBuffer, LEVELS_MAX, Level, Part, Reads, Selection,
-    TEAM,
+    Declaration, Delegation, Division, DivisionBuffer, LEVELS_MAX, Level, Memory, Part, Reads,
+    Selection, TEAM,
 };
 pub use parameters::Parameters;
 pub use table::PolicyTable;

@@ -4,7 +4,7 @@ use mackrl::{
     algorithms::{ActorCritic, ActorCriticSettings, AlgorithmKind, CentralV, Mackrl},
     common_knowledge::CommonKnowledgeFeatures,
     experience::{Collector, Episode, PlaySettings},
-    hierarchy::{Hierarchy, HierarchySettings},
+    hierarchy::{Hierarchy, HierarchySettings, NetworkStyle},
     policy::{Behaviour, Declaration, Parameters, Policy, Recording},
 };
 use mackrl_env::{EpisodeKey, Stream, settings::Settings};
@@ -53,6 +53,7 @@ impl Team {
         let networks = HierarchySettings {
             common_knowledge: own.common_knowledge,
             hidden: learning.hidden,
+            networks: NetworkStyle::Plain,
         };
         Self::declared(world, declaration, networks).which_is(&Mackrl, &table)
     }
@@ -66,6 +67,7 @@ impl Team {
         let networks = HierarchySettings {
             common_knowledge: CommonKnowledgeFeatures::default(),
             hidden: learning.hidden,
+            networks: NetworkStyle::Plain,
         };
         Self::declared(world, declaration, networks).which_is(&CentralV, &table)
     }
@@ -78,7 +80,11 @@ impl Team {
         )
     }
 
-    fn declared(world: RunWorld, declaration: Declaration, networks: HierarchySettings) -> Self {
+    pub(crate) fn declared(
+        world: RunWorld,
+        declaration: Declaration,
+        networks: HierarchySettings,
+    ) -> Self {
         let hierarchy = Hierarchy::new(declaration, world.spec(), &world.prior(), networks);
         Self { world, hierarchy }
     }

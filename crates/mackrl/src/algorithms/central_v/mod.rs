@@ -9,7 +9,7 @@ use crate::{
     Error,
     algorithms::{ActorCritic, ActorCriticSettings, Algorithm, AlgorithmKind, Team},
     common_knowledge::CommonKnowledgeFeatures,
-    hierarchy::{Hierarchy, HierarchySettings},
+    hierarchy::{Hierarchy, HierarchySettings, NetworkStyle},
     policy::Declaration,
 };
 
@@ -62,6 +62,7 @@ fn parts(table: &toml::Table, team: Team<'_>) -> Result<(Hierarchy, ActorCriticS
         // No group reads it.
         common_knowledge: CommonKnowledgeFeatures::default(),
         hidden: settings.hidden,
+        networks: NetworkStyle::Plain,
     };
     let hierarchy = Hierarchy::new(declaration, team.spec, team.prior, own);
     Ok((hierarchy, settings))

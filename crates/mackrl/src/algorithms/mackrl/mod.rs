@@ -12,7 +12,7 @@ use crate::{
     algorithms::{
         ActorCritic, ActorCriticSettings, Algorithm, AlgorithmKind, Automatic, Preset, Team,
     },
-    hierarchy::{Hierarchy, HierarchySettings},
+    hierarchy::{Hierarchy, HierarchySettings, NetworkStyle},
     partition::PartitionSchedule,
 };
 
@@ -114,10 +114,6 @@ impl AlgorithmKind for Mackrl {
     fn presets(&self) -> &'static [Preset] {
         &[
             Preset {
-                name: "default",
-                text: include_str!("presets/default.toml"),
-            },
-            Preset {
                 name: "fours",
                 text: include_str!("presets/fours.toml"),
             },
@@ -144,6 +140,7 @@ fn parts(table: &toml::Table, team: Team<'_>) -> Result<(Hierarchy, ActorCriticS
     let own = HierarchySettings {
         common_knowledge: settings.common_knowledge,
         hidden: learning.hidden,
+        networks: NetworkStyle::Plain,
     };
     let hierarchy = Hierarchy::new(declaration, team.spec, team.prior, own);
     Ok((hierarchy, learning))

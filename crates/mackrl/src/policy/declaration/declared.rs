@@ -2,7 +2,9 @@
 
 use mackrl_env::AgentId;
 
-use super::{Declaration, Delegation, Division, LEVELS_MAX, Level, Part, Reads, Selection, TEAM};
+use super::{
+    Declaration, Delegation, Division, LEVELS_MAX, Level, Memory, Part, Reads, Selection, TEAM,
+};
 use crate::{
     Error,
     partition::{Pairs, PartitionSchedule, Partitions, ways_to_divide},
@@ -98,6 +100,7 @@ impl Declaration {
             selection: Selection::Learned,
             reads: Reads::CommonKnowledgeAndMembers,
             explores: false,
+            memory: Memory::Episode,
             active: Vec::new(),
         };
         let mut team = team(agents, divisions);
@@ -152,6 +155,7 @@ impl Declaration {
             actions,
             levels,
             rounds,
+            hold: Some(1),
             is_pairwise,
         }
     }
@@ -167,6 +171,7 @@ fn team(agents: usize, divisions: Vec<Division>) -> Level {
         selection: Selection::Learned,
         reads: Reads::CommonKnowledge,
         explores: false,
+        memory: Memory::Episode,
         active: Vec::new(),
     }
 }
@@ -193,6 +198,7 @@ fn pairs(agents: usize, below: usize, delegation: Delegation) -> Level {
         selection: Selection::Learned,
         reads: Reads::CommonKnowledgeAndMembers,
         explores: true,
+        memory: Memory::Episode,
         active: Vec::new(),
     }
 }
@@ -207,6 +213,7 @@ fn alone(agents: usize) -> Level {
         selection: Selection::Learned,
         reads: Reads::OwnObservation,
         explores: true,
+        memory: Memory::Episode,
         active: Vec::new(),
     }
 }

@@ -55,6 +55,17 @@ pub enum Reads {
     OwnObservation,
 }
 
+/// How long a group's controller remembers what it read.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Memory {
+    /// From the first step of the episode on, whether the group is chosen or not.
+    #[default]
+    Episode,
+    /// As long as the group is formed: a group that was not formed at the step before begins anew. Groups that are not formed
+    /// cost nothing, and under a partition that changes at every step a controller has no memory.
+    WhileFormed,
+}
+
 /// A group of a later level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Part {
@@ -91,6 +102,8 @@ pub struct Level {
     pub reads: Reads,
     /// Whether exploration is mixed into its choices.
     pub explores: bool,
+    /// How long its controllers remember.
+    pub memory: Memory,
     /// Groups that some division of an earlier level contains, ascending.
     pub active: Vec<usize>,
 }
@@ -103,6 +116,8 @@ pub struct Declaration {
     levels: Vec<Level>,
     /// The team's divisions where they change from step to step.
     rounds: Option<Partitions>,
+    /// Steps for which a round stays in force; none if it does for the whole episode.
+    hold: Option<usize>,
     is_pairwise: bool,
 }
 
@@ -209,6 +224,22 @@ impl Declaration {
         self.rounds.is_none()
     }
 
+    /// The same hierarchy with each round of its partitions in force for `hold` steps (at least 1), or for the whole episode if
+    /// that is 0, and pair controllers that remember for so long.
+    ///
+    /// # Panics
+    /// If its partitions do not take turns.
+    #[must_use]
+    pub fn with_partitions_held(mut self, hold: usize, memory: Memory) -> Self {
+        assert!(!self.is_fixed(), "partitions that take turns");
+        self.hold = (hold > 0).then_some(hold);
+        let alone = self.alone();
+        for level in &mut self.levels[TEAM + 1..alone] {
+            level.memory = memory;
+        }
+        self
+    }
+
     /// The ways in which the team may divide at `step` of the episode named `key`: a pure function of the two.
     #[must_use]
     pub fn in_force<'a>(
@@ -224,7 +255,8 @@ impl Declaration {
             partitions,
             division,
         } = buffer;
-        let [partition, ..] = rounds.in_force(key, step, partitions) else {
+        let round = self.hold.map_or(0, |hold| step / hold);
+        let [partition, ..] = rounds.in_force(key, round, partitions) else {
             unreachable!("a round robin has one partition at a step");
         };
         division.assign(partition);

@@ -1,0 +1,219 @@
+//! The settings of the learners with a clipped surrogate.
+
+use mackrl_env::{
+    declare_settings, declare_words,
+    settings::{Accepts, EXACT, SettingsError, WrongSetting},
+};
+
+use crate::{
+    algorithms::PartitionChoice,
+    common_knowledge::CommonKnowledgeFeatures,
+    nn::OptimiserKind,
+    objectives::ValueLoss,
+    policy::{Delegation, Memory, Selection},
+};
+
+declare_words! {
+    /// What is weighed by itself, with a ratio, an advantage and an entropy of its own.
+    pub enum Groups {
+        /// Pairs that commonly know a joint action, and single agents.
+        #[default]
+        Choosing = "choosing",
+        /// All pairs that are formed of living agents, and single agents.
+        Formed = "formed",
+    }
+}
+
+declare_words! {
+    /// How long a pair's controller remembers.
+    pub enum PairMemory {
+        /// As long as the pair is formed.
+        #[default]
+        Formed = "formed",
+        /// The whole episode, formed or not.
+        Episode = "episode",
+    }
+}
+
+declare_settings! {
+    /// Sizes of the networks, and how they learn from a batch of episodes in several epochs.
+    pub struct PpoSettings {
+        /// Units in each hidden layer and each recurrent state of the controllers.
+        hidden: usize = 64, Accepts::integer(1, 4096);
+        /// Units in each hidden layer of the critic.
+        critic_hidden: usize = 64, Accepts::integer(1, 4096);
+        /// Step size of the controllers at the first environment step.
+        learning_rate: f64 = 5e-4, Accepts::above_within(0.0, 1.0);
+        /// Step size of the critic at the first environment step.
+        critic_learning_rate: f64 = 5e-4, Accepts::above_within(0.0, 1.0);
+        /// Environment steps over which step sizes and the weight of the entropy change linearly to what they are in the end.
+        schedule_steps_env: u64 = 200_000, Accepts::integer(1, EXACT);
+        /// What both step sizes are multiplied by in the end.
+        learning_rate_finish: f64 = 1.0, Accepts::above_within(0.0, 1.0);
+        /// Times that a batch is gone through. Each epoch is one step of the controllers and one of the critic on the whole batch;
+        /// activations are computed anew, from the first step of each episode to the last.
+        epochs: usize = 5, Accepts::integer(1, 1000);
+        /// How far a group's ratio of probabilities may move from 1 before it gains nothing more. Where a ratio is that of the whole
+        /// team, this is divided by the square root of the number of groups.
+        clip: f64 = 0.2, Accepts::above_within(0.0, 1.0);
+        /// How far a value may move within an update before its loss stops falling, in standard deviations of returns.
+        value_clip: f64 = 0.2, Accepts::above(0.0);
+        /// Errors of values beyond this count linearly, in standard deviations of returns.
+        huber: f64 = 10.0, Accepts::above(0.0);
+        /// Discount γ of one environment step.
+        gamma: f64 = 0.99, Accepts::within(0.0, 1.0);
+        /// λ of the generalised advantages: 0 looks one step ahead, 1 to the end of the episode.
+        lambda: f64 = 0.95, Accepts::within(0.0, 1.0);
+        /// Weight of the entropy of what each group does, over all ways to it, beside its normalised advantage, at the first
+        /// environment step.
+        entropy_weight: f64 = 0.05, Accepts::within(0.0, 1.0);
+        /// The same in the end.
+        entropy_weight_finish: f64 = 0.01, Accepts::within(0.0, 1.0);
+        /// Longest gradient (Euclidean norm over all parameters of the policy, or of the critic); longer ones are shortened.
+        gradient_norm_max: f64 = 10.0, Accepts::above(0.0);
+        /// What the orthogonal initial weights of the controllers' last layers are multiplied by: small numbers make the first choices
+        /// almost even.
+        policy_gain: f64 = 0.01, Accepts::above_within(0.0, 100.0);
+        /// Environments that run side by side; each gives one episode to an update.
+        environments: usize = 32, Accepts::integer(1, 4096);
+        /// Pieces into which the environments are cut for work in parallel; as many threads as this can be used. It decides the
+        /// last bits of a result, which the number of threads does not.
+        shards: usize = 2, Accepts::integer(1, 4096);
+    }
+}
+
+declare_settings! {
+    /// The hierarchy of MACKRL-PPO.
+    pub struct MackrlPpoSettings {
+        /// Which features of commonly known entities the controllers read: all of them, or those of the authors' code.
+        common_knowledge: CommonKnowledgeFeatures = CommonKnowledgeFeatures::Complete, CommonKnowledgeFeatures::ACCEPTS;
+        /// Which partitions into pairs there are. `round-robin` has one in force at a time, so that each group is weighed by itself;
+        /// the others leave the choice to the pair selector and weigh the team as a whole.
+        partitions: PartitionChoice = PartitionChoice::RoundRobin, PartitionChoice::ACCEPTS;
+        /// Environment steps for which a partition of `round-robin` stays in force; 0 for the whole episode.
+        hold_steps_env: u64 = 1, Accepts::integer(0, EXACT);
+        /// How long a pair's controller remembers, under `round-robin`: as long as the pair is formed, or the whole episode.
+        pair_memory: PairMemory = PairMemory::Formed, PairMemory::ACCEPTS;
+        /// How a partition is chosen where there are several: the pair selector decides, or, as an ablation, all are equally likely.
+        selector: Selection = Selection::Learned, Selection::ACCEPTS;
+        /// When pairs delegate: their controllers decide, or, as ablations, always, or only where no joint action is commonly known.
+        delegation: Delegation = Delegation::Learned, Delegation::ACCEPTS;
+        /// Logit of delegating, of an untrained pair controller, above that of a joint action.
+        delegation_logit: f64 = 3.0, Accepts::within(-1000.0, 1000.0);
+        /// What is weighed by itself: pairs that commonly know a joint action and single agents, or all pairs that are formed.
+        groups: Groups = Groups::Choosing, Groups::ACCEPTS;
+    }
+}
+
+impl PpoSettings {
+    /// Adam with a larger ε than usual, so that small gradients make small steps.
+    pub(super) const OPTIMISER: OptimiserKind = OptimiserKind::Adam {
+        beta1: 0.9,
+        beta2: 0.999,
+        epsilon: 1e-5,
+    };
+
+    /// What step sizes are multiplied by after so many environment steps.
+    #[must_use]
+    pub fn learning_rate_factor(&self, steps_env: u64) -> f64 {
+        1.0 + (self.learning_rate_finish - 1.0) * self.progress(steps_env)
+    }
+
+    /// The weight of the entropy after so many environment steps.
+    #[must_use]
+    pub fn entropy_weight_at(&self, steps_env: u64) -> f64 {
+        let (start, finish) = (self.entropy_weight, self.entropy_weight_finish);
+        start + (finish - start) * self.progress(steps_env)
+    }
+
+    fn progress(&self, steps_env: u64) -> f64 {
+        (steps_env as f64 / self.schedule_steps_env as f64).min(1.0)
+    }
+
+    /// What makes a value wrong.
+    pub(super) fn value_loss(&self) -> ValueLoss<f32> {
+        use crate::Real;
+        ValueLoss {
+            clip: Real::from_f64(self.value_clip),
+            huber: Real::from_f64(self.huber),
+        }
+    }
+}
+
+impl MackrlPpoSettings {
+    /// Checks what a setting asks of others and of a team of so many agents, called `world`.
+    pub(super) fn check(&self, agents: usize, world: &str) -> Result<(), SettingsError> {
+        if let Some(expected) = self.partitions.expected_of(agents) {
+            return Err(SettingsError::Wrong(WrongSetting {
+                name: "partitions".to_owned(),
+                found: format!("\"{}\"", self.partitions),
+                expected: format!("{expected} for the {agents} agents of {world}"),
+                nearest: None,
+            }));
+        }
+        if self.partitions == PartitionChoice::RoundRobin || self.hold_steps_env == 1 {
+            return Ok(());
+        }
+        let wrong = |name: &str, found: String, expected: &str| WrongSetting {
+            name: name.to_owned(),
+            found,
+            expected: expected.to_owned(),
+            nearest: None,
+        };
+        Err(SettingsError::AtOdds(Box::new([
+            wrong(
+                "hold_steps_env",
+                self.hold_steps_env.to_string(),
+                "1, unless algorithm.partitions is \"round-robin\"",
+            ),
+            wrong(
+                "partitions",
+                format!("\"{}\"", self.partitions),
+                "\"round-robin\", unless algorithm.hold_steps_env is 1",
+            ),
+        ])))
+    }
+
+    /// How long pairs remember.
+    pub(super) const fn memory(&self) -> Memory {
+        match self.pair_memory {
+            PairMemory::Formed => Memory::WhileFormed,
+            PairMemory::Episode => Memory::Episode,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_has_a_schedule_changes_linearly_and_then_stays() {
+        let settings = PpoSettings {
+            learning_rate_finish: 0.2,
+            entropy_weight: 0.03,
+            entropy_weight_finish: 0.01,
+            schedule_steps_env: 1000,
+            ..PpoSettings::default()
+        };
+        for (steps, expected) in [(0, 1.0), (500, 0.6), (1000, 0.2), (10_000, 0.2)] {
+            let found = settings.learning_rate_factor(steps);
+            assert!((found - expected).abs() < 1e-12, "{steps}: {found}");
+        }
+        assert!((settings.entropy_weight_at(500) - 0.02).abs() < 1e-12);
+    }
+
+    #[test]
+    fn partitions_are_held_only_where_they_take_turns() {
+        let held = MackrlPpoSettings {
+            hold_steps_env: 5,
+            ..MackrlPpoSettings::default()
+        };
+        assert!(held.check(3, "3m").is_ok());
+        let all = MackrlPpoSettings {
+            partitions: PartitionChoice::All,
+            ..held
+        };
+        assert!(all.check(3, "3m").is_err());
+    }
+}

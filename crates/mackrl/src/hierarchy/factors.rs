@@ -1,0 +1,318 @@
+//! Learning group by group: where one division of the team is in force at a step, p(u) is the product of its groups' marginals
+//! `q_g(u_g)`, and each can be weighed by itself.
+//!
+//! A group is what can choose for itself: a pair that commonly knows a joint action, or an agent. A pair that can only divide is
+//! two agents that choose independently. So a hierarchy in which pairs never act jointly has the factors of one without pairs.
+//!
+//! An epoch of learning costs the networks and little more: tables, walks and posteriors over partitions are not needed here.
+
+use super::{
+    Hierarchy, Parts,
+    activations::{Activations, BankActivations},
+    evaluation::kept,
+};
+use crate::{
+    Error,
+    experience::{Experience, Instance, Piece},
+    marginalisation::pair::{PairGradient, PairRows, gradient_alone},
+    policy::{Parameters, Recording, TEAM},
+};
+
+/// No row.
+const NONE: usize = usize::MAX;
+
+/// The level of pairs, where there is one.
+const PAIRS: usize = 1;
+
+/// The choice of one group at one step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Factor {
+    /// b: the episode.
+    pub episode: usize,
+    /// t: the step.
+    pub step: usize,
+    /// Its first member, or the only one.
+    pub first: usize,
+    /// Its second member, if it is a pair.
+    pub second: Option<usize>,
+    /// The pair's row among all that were asked.
+    pair_row: usize,
+    /// The members' rows among all that were asked.
+    rows: [usize; 2],
+    /// What they did.
+    actions: [usize; 2],
+}
+
+/// Which pairs are weighed as one, though they can only divide.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Weighing {
+    /// None: a pair that can only divide is two agents.
+    #[default]
+    Choosing,
+    /// All that are formed of living agents.
+    Formed,
+}
+
+/// Rows of the networks to go through again: the numbers between passes, kept to save allocation.
+#[derive(Debug, Clone, Default)]
+pub struct FactorWorkspace {
+    log_q: Vec<f32>,
+    pair: Vec<f32>,
+}
+
+impl Factor {
+    /// The members.
+    pub fn members(&self) -> impl Iterator<Item = usize> {
+        [Some(self.first), self.second].into_iter().flatten()
+    }
+}
+
+impl Hierarchy {
+    /// Whether one division of the team is in force at every step, into pairs and agents.
+    #[must_use]
+    pub fn factorises(&self) -> bool {
+        let declaration = &self.parts.declaration;
+        let levels = declaration.levels();
+        levels[TEAM].divisions == 1 && (levels.len() == 2 || declaration.is_pairwise())
+    }
+
+    /// The choices of an experience, group by group, of living agents.
+    ///
+    /// # Panics
+    /// If the hierarchy does not [factorise](Self::factorises), or the experience is not one of its own.
+    #[must_use]
+    pub fn factors(&self, experience: &Experience, weighing: Weighing) -> Vec<Factor> {
+        assert!(self.factorises(), "one division at a time");
+        let parts = &*self.parts;
+        let declaration = &parts.declaration;
+        let agents = declaration.agents();
+        let alone = declaration.alone();
+        let bank = &experience.banks[alone];
+        let mut factors = Vec::with_capacity(bank.steps().len() * agents);
+        let mut row_bn = vec![NONE; experience.episodes.len() * agents];
+        for (t, step) in bank.steps().iter().enumerate() {
+            row_bn.fill(NONE);
+            for (place, &row) in bank.asked_of(step).iter().enumerate() {
+                let Instance { environment, group } = bank.instances_of(step)[row];
+                row_bn[environment * agents + group] = step.asked.start + place;
+            }
+            let action = |b: usize, agent: usize| experience.episodes[b].actions(t)[agent].index();
+            if parts.banks[PAIRS].is_some() && alone != PAIRS {
+                let pairs = &experience.banks[PAIRS];
+                let step = &pairs.steps()[t];
+                let masks = pairs.masks_of(step).chunks_exact(pairs.columns());
+                for ((place, &row), mask) in pairs.asked_of(step).iter().enumerate().zip(masks) {
+                    let Instance { environment, group } = pairs.instances_of(step)[row];
+                    let members = &declaration.levels()[PAIRS].groups[group];
+                    let [first, second] = [members[0].index(), members[1].index()];
+                    let places = [first, second].map(|agent| environment * agents + agent);
+                    let rows = places.map(|place| row_bn[place]);
+                    let chooses = weighing == Weighing::Formed || mask[1..].contains(&true);
+                    if !chooses || rows.contains(&NONE) {
+                        continue;
+                    }
+                    places.into_iter().for_each(|place| row_bn[place] = NONE);
+                    factors.push(Factor {
+                        episode: environment,
+                        step: t,
+                        first,
+                        second: Some(second),
+                        pair_row: step.asked.start + place,
+                        rows,
+                        actions: [first, second].map(|agent| action(environment, agent)),
+                    });
+                }
+            }
+            for (place, &row) in row_bn.iter().enumerate() {
+                if row == NONE {
+                    continue;
+                }
+                let (episode, agent) = (place / agents, place % agents);
+                factors.push(Factor {
+                    episode,
+                    step: t,
+                    first: agent,
+                    second: None,
+                    pair_row: NONE,
+                    rows: [row, NONE],
+                    actions: [action(episode, agent), 0],
+                });
+            }
+        }
+        factors
+    }
+
+    /// The piece's experience and its activations under `parameters`: those that its actor kept, if they serve, else computed
+    /// again without the marginal of the whole team.
+    ///
+    /// # Errors
+    /// [`Error::Data`] if another kind of policy played it.
+    pub fn networks<'a>(
+        &self,
+        parameters: &Parameters,
+        piece: &'a mut Piece,
+    ) -> Result<(&'a Experience, &'a mut Activations), Error> {
+        let (experience, activations) = kept(piece)?;
+        if !activations.serve(parameters.version()) {
+            self.recompute_networks(parameters, experience, activations);
+        }
+        Ok((experience, activations))
+    }
+
+    /// Computes all networks on an experience's inputs, without the marginal of the whole team.
+    ///
+    /// # Panics
+    /// If the experience is not one of this hierarchy's, recorded for learning.
+    pub fn recompute_networks(
+        &self,
+        parameters: &Parameters,
+        experience: &Experience,
+        activations: &mut Activations,
+    ) {
+        let parts = &*self.parts;
+        let weights = parts.weights(parameters);
+        activations.begin(parameters.version(), Recording::ForLearning);
+        for (level, own) in activations.banks.iter_mut().enumerate() {
+            let (Some(own), Some(bank), Some(weights)) =
+                (own, &parts.banks[level], &weights[level])
+            else {
+                continue;
+            };
+            let rows = &experience.banks[level];
+            let epsilon = parts.epsilon(level, experience.exploration);
+            for step in rows.steps() {
+                own.compute(&bank.network, weights, (rows, step), epsilon);
+            }
+        }
+    }
+
+    /// Writes log q of every factor under the parameters that the activations belong to.
+    ///
+    /// # Shapes
+    /// `log_q_i` becomes as long as `factors`.
+    pub fn log_q(&self, activations: &Activations, factors: &[Factor], log_q_i: &mut Vec<f32>) {
+        let (pairs, agents) = self.parts.split(activations);
+        log_q_i.clear();
+        log_q_i.extend(factors.iter().map(|factor| match factor.second {
+            Some(_) => {
+                let pairs = pairs.expect("a pair has a controller");
+                pair_rows(pairs, agents, factor).log_q(factor.actions)
+            }
+            None => agents.log_p(factor.rows[0])[factor.actions[0]],
+        }));
+    }
+
+    /// Adds the gradient of `Σ_i d_log_q_i log q_i + entropy_weight Σ_i H(q_i)` to `gradient`, and gives `Σ_i H(q_i)`. The
+    /// activations are used up.
+    ///
+    /// # Shapes
+    /// `d_log_q_i` as `factors`, `gradient` as the layout.
+    ///
+    /// # Panics
+    /// If the activations are spent or belong to other parameters.
+    pub fn backward_factors(
+        &self,
+        parameters: &Parameters,
+        experience: &Experience,
+        activations: &mut Activations,
+        (factors, d_log_q_i): (&[Factor], &[f32]),
+        entropy_weight: f32,
+        workspace: &mut FactorWorkspace,
+        gradient: &mut [f32],
+    ) -> f64 {
+        assert!(
+            activations.serve(parameters.version()),
+            "activations are those of these parameters, and unspent"
+        );
+        assert_eq!(
+            factors.len(),
+            d_log_q_i.len(),
+            "a derivative of each factor"
+        );
+        let parts = &*self.parts;
+        let alone = parts.declaration.alone();
+        for own in activations.banks.iter_mut().flatten() {
+            own.trace.all_logits_gradient_mut().fill(0.0);
+        }
+        let (before, rest) = activations.banks.split_at_mut(alone);
+        let agents = rest[0].as_mut().expect("agents have controllers");
+        let mut pairs = before.get_mut(PAIRS).and_then(Option::as_mut);
+        let columns = agents.law().columns;
+        let mut entropy = 0.0;
+        let mut second_gradient = vec![0.0; columns];
+        let mut first_gradient = vec![0.0; columns];
+        for (factor, &weight) in factors.iter().zip(d_log_q_i) {
+            let weights = [weight, entropy_weight];
+            let place = |row: usize| row * columns..(row + 1) * columns;
+            if factor.second.is_none() {
+                let row = place(factor.rows[0]);
+                let own = [
+                    &agents.softmax_rc[row.clone()],
+                    &agents.log_p_rc[row.clone()],
+                ];
+                let to = &mut agents.trace.all_logits_gradient_mut()[row];
+                entropy += f64::from(gradient_alone(own, factor.actions[0], weights, to));
+                continue;
+            }
+            let pairs = pairs.as_deref_mut().expect("a pair has a controller");
+            let width = pairs.law().columns;
+            workspace.pair.resize(width, 0.0);
+            let to = PairGradient {
+                pair: &mut workspace.pair,
+                first: &mut first_gradient,
+                second: &mut second_gradient,
+            };
+            let rows = pair_rows(pairs, agents, factor);
+            let own = rows.gradient(factor.actions, weights, &mut workspace.log_q, to);
+            entropy += f64::from(own);
+            let row = factor.pair_row * width..(factor.pair_row + 1) * width;
+            pairs.trace.all_logits_gradient_mut()[row].copy_from_slice(&workspace.pair);
+            let to = agents.trace.all_logits_gradient_mut();
+            to[place(factor.rows[0])].copy_from_slice(&first_gradient);
+            to[place(factor.rows[1])].copy_from_slice(&second_gradient);
+        }
+        let weights = parts.weights(parameters);
+        for (level, own) in activations.banks.iter_mut().enumerate() {
+            let (Some(own), Some(bank), Some(weights)) =
+                (own, &parts.banks[level], &weights[level])
+            else {
+                continue;
+            };
+            let inputs = experience.banks[level].input_rf();
+            bank.network
+                .backward(weights, inputs, &mut own.trace, gradient);
+        }
+        entropy
+    }
+}
+
+impl Parts {
+    /// The activations of pairs, if there are pairs, and of agents.
+    fn split<'a>(
+        &self,
+        activations: &'a Activations,
+    ) -> (Option<&'a BankActivations>, &'a BankActivations) {
+        let alone = self.declaration.alone();
+        let agents = activations.banks[alone].as_ref();
+        let pairs = (alone > PAIRS).then(|| activations.banks[PAIRS].as_ref());
+        (pairs.flatten(), agents.expect("agents have controllers"))
+    }
+}
+
+/// The rows of a pair and its members.
+fn pair_rows<'a>(
+    pairs: &'a BankActivations,
+    agents: &'a BankActivations,
+    factor: &Factor,
+) -> PairRows<'a, f32> {
+    let of = |bank: &'a BankActivations, row: usize| {
+        let columns = bank.law().columns;
+        let place = row * columns..(row + 1) * columns;
+        [&bank.softmax_rc[place.clone()], &bank.log_p_rc[place]]
+    };
+    PairRows {
+        pair: of(pairs, factor.pair_row),
+        first: of(agents, factor.rows[0]),
+        second: of(agents, factor.rows[1]),
+    }
+}
