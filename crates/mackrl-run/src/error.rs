@@ -36,6 +36,12 @@ pub enum RunError {
         /// The folder.
         folder: PathBuf,
     },
+    /// A folder that was moved or removed while a run was being made in it.
+    #[error("{} was moved or removed while the run was being made", folder.display())]
+    FolderReplaced {
+        /// Where it lay.
+        folder: PathBuf,
+    },
     /// A folder in which no run lies.
     #[error("{} is not a run folder: it has no config.toml", folder.display())]
     NotARun {
@@ -149,6 +155,15 @@ impl RunError {
             cause = error.source();
         }
         text
+    }
+
+    /// The error itself, without what it kept from being done.
+    #[must_use]
+    pub fn root(&self) -> &Self {
+        match self {
+            Self::Within { source, .. } => source.root(),
+            error => error,
+        }
     }
 
     /// Whether this is [`RunError::Interrupted`].

@@ -5,6 +5,7 @@
 
 pub mod bounded;
 pub mod config;
+pub mod folder;
 pub mod provenance;
 pub mod recorded;
 pub mod replay;

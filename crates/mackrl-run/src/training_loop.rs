@@ -14,7 +14,7 @@ use crate::{
     config::Config,
     error::{Result, RunError},
     provenance::{Provenance, Versions},
-    run_folder::{Resumption, RunFolder, Status},
+    run_folder::{Completeness, Resumption, RunFolder, Status, StoredRun},
     stop_request::StopRequest,
     training::{Checkpoint, MetricRow, Trainer, assembly::RunWorld},
 };
@@ -94,18 +94,30 @@ pub fn resume(
     stop: &StopRequest,
     observer: &mut dyn Observer,
 ) -> Result<Option<Summary>> {
-    if RunFolder::is_finished(path) {
-        return Ok(None);
+    match StoredRun::open(path)?.completeness()? {
+        Completeness::Finished => return Ok(None),
+        Completeness::WithoutWeights => observer.warn(&format!(
+            "{} was finished, and its weights are lost or damaged since: its last checkpoint gives them again",
+            path.display()
+        )),
+        Completeness::Unfinished => {}
     }
     let Resumption {
         mut folder,
         config,
         checkpoint,
         damaged,
+        metrics_put_aside,
         earlier,
     } = RunFolder::resume(path, threads)?;
     for damage in damaged {
         observer.warn(&format!("{damage}; an earlier one is used"));
+    }
+    if let Some(aside) = metrics_put_aside {
+        observer.warn(&format!(
+            "the metrics are not those of the checkpoint: what is left of them is put aside as {}, and no rows before this point are known any more",
+            aside.display()
+        ));
     }
     if let Some(earlier) = earlier {
         observer.warn(&format!(

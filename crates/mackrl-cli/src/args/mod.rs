@@ -16,7 +16,7 @@ mod sc2;
 mod serve;
 mod sweep;
 
-use std::{path::PathBuf, sync::LazyLock};
+use std::{num::NonZeroUsize, path::PathBuf, sync::LazyLock};
 
 use clap::{Args, Parser, Subcommand};
 use mackrl::nn::InstructionSet;
@@ -58,6 +58,19 @@ pub(crate) use sweep::SweepArgs;
 pub(crate) struct Cli {
     #[command(subcommand)]
     pub(crate) command: Command,
+}
+
+/// Most episodes that can be asked for: years of them.
+const EPISODES_MOST: usize = 1_000_000_000;
+
+/// Reads a count from 1 to `most`, of what takes memory or time for each.
+fn count_to(most: usize) -> impl Fn(&str) -> Result<NonZeroUsize, String> + Clone + Send + Sync {
+    move |text| {
+        let count = text.parse::<NonZeroUsize>().ok();
+        count
+            .filter(|count| count.get() <= most)
+            .ok_or_else(|| format!("expected 1 to {most}"))
+    }
 }
 
 /// What `--version` tells: the version, and the instructions that this machine computes with.

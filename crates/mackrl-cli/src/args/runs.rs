@@ -4,7 +4,7 @@ use std::{num::NonZeroUsize, path::PathBuf};
 
 use clap::Args;
 
-use crate::args::ConfigurationArgs;
+use crate::args::{ConfigurationArgs, EPISODES_MOST, count_to};
 
 /// Train a team, and write its weights, metrics and configuration into a run folder
 ///
@@ -69,7 +69,7 @@ pub(crate) struct EvaluateArgs {
     pub(crate) run: PathBuf,
 
     /// Episodes to play
-    #[arg(long, value_name = "N", default_value = "320")]
+    #[arg(long, value_name = "N", default_value = "320", value_parser = count_to(EPISODES_MOST))]
     pub(crate) episodes: NonZeroUsize,
 
     /// Seed of the episodes [default: the run's own]
@@ -103,7 +103,7 @@ pub(crate) struct CertifyArgs {
     pub(crate) run: PathBuf,
 
     /// Episodes to compare in each mode, sampled and greedy
-    #[arg(long, value_name = "N", default_value = "100")]
+    #[arg(long, value_name = "N", default_value = "100", value_parser = count_to(EPISODES_MOST))]
     pub(crate) episodes: NonZeroUsize,
 
     /// Seed of the episodes [default: the run's own]

@@ -70,7 +70,7 @@ struct AgentProcess {
 
 impl AgentProcess {
     fn start(folder: &Path, weights: &Path, agent: usize) -> anyhow::Result<Self> {
-        let program = std::env::current_exe().context("cannot find this program")?;
+        let program = super::this_program()?;
         let mut child = Command::new(program)
             .arg("execute-agent")
             .arg(folder)
