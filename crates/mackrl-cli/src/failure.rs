@@ -58,8 +58,16 @@ pub(crate) enum Failure {
         problems: usize,
     },
     /// A team that does not run decentralised.
-    #[error("not decentralised: {mismatches} actions differ from the central run")]
+    #[error("not decentralised: {mismatches} comparisons with the central run failed")]
     CertificateFailed { mismatches: u64 },
+    /// An agent that was ended because it tried to reach something beyond what it is told.
+    #[error(
+        "not decentralised: agent {agent} tried to reach a file, the network or another process, and was ended by the system"
+    )]
+    ReachedOut {
+        /// Its number.
+        agent: usize,
+    },
     /// Quantities in which the simulator is not the game.
     #[error("the simulator differs from the real game in {failed} of {rows} quantities")]
     Unfaithful {
@@ -185,6 +193,7 @@ fn of_failure(failure: &Failure) -> Verdict {
         Failure::MadeElsewhere { .. } => (Exit::Interrupted, None),
         Failure::Different { .. }
         | Failure::CertificateFailed { .. }
+        | Failure::ReachedOut { .. }
         | Failure::Unfaithful { .. } => (Exit::Differs, None),
         Failure::OtherVersions { .. } => (
             Exit::Usage,

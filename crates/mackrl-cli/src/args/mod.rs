@@ -35,7 +35,7 @@ pub(crate) use fidelity::FidelityArgs;
 pub(crate) use inquiry::DiffArgs;
 pub(crate) use play::PlayArgs;
 pub(crate) use replay::{ExplainArgs, ReplayArgs};
-pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, TrainArgs};
+pub(crate) use runs::{CertifyArgs, EvaluateArgs, ResumeArgs, TrainArgs};
 pub(crate) use sc2::Sc2Args;
 #[cfg(all(feature = "sc2", target_os = "linux"))]
 pub(crate) use sc2::{
@@ -88,8 +88,11 @@ pub(crate) enum Command {
     Resume(ResumeArgs),
     Evaluate(EvaluateArgs),
     Certify(CertifyArgs),
+    /// Live as one agent of a trained team: learn from stdin who it is, read local views, and write actions to stdout
+    ///
+    /// `mackrl certify` starts one such process per agent.
     #[command(hide = true)]
-    ExecuteAgent(ExecuteAgentArgs),
+    ExecuteAgent,
     Sweep(SweepArgs),
     Plot(PlotArgs),
     Report(ReportArgs),
