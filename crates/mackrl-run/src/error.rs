@@ -144,6 +144,16 @@ impl From<ConfigError> for RunError {
     }
 }
 
+/// That there can be no further thread.
+impl From<io::Error> for RunError {
+    fn from(source: io::Error) -> Self {
+        Self::System {
+            what: "cannot start a thread".to_owned(),
+            source,
+        }
+    }
+}
+
 impl RunError {
     /// The error and what caused it, on one line.
     #[must_use]
