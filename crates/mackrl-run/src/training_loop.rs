@@ -11,13 +11,17 @@ use std::{
 use serde::Serialize;
 
 use crate::{
+    apart::{Apart, PATIENCE},
     config::Config,
     error::{Result, RunError},
     provenance::{Provenance, Versions},
-    run_folder::{Resumption, RunFolder, Status},
+    run_folder::{Completeness, Resumption, RunFolder, Status, StoredRun, latest_row},
     stop_request::StopRequest,
     training::{Checkpoint, MetricRow, Trainer, assembly::RunWorld},
 };
+
+/// Most bytes of a checkpoint that is still written when a stop was asked for: a second or two.
+const QUICKLY_WRITTEN: usize = 256 << 20;
 
 /// How a run stands.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -76,8 +80,20 @@ pub fn train(
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
     RunFolder::check_free(path)?;
-    let trainer = Trainer::in_world(config, world, threads)?;
-    let mut training = Reporting::new(trainer, config, stop);
+    let made = {
+        let (own, world, asked) = (config.clone(), world.clone(), stop.clone());
+        let make = move || -> Result<_> {
+            let trainer = Trainer::in_world(&own, &world, threads)?;
+            Ok(Reporting::new(trainer, &own, &asked))
+        };
+        Apart::start(make, stop)
+    };
+    let Ok(training) = made else {
+        // Nothing is made yet, and the run can go on from there.
+        RunFolder::prepare(path, config, threads)?;
+        return Err(interrupted(path, 0));
+    };
+    let mut training = training?;
     let mut folder = RunFolder::create(path, config, threads)?;
     train_into(&mut folder, &mut training, config, stop, observer)
 }
@@ -94,18 +110,30 @@ pub fn resume(
     stop: &StopRequest,
     observer: &mut dyn Observer,
 ) -> Result<Option<Summary>> {
-    if RunFolder::is_finished(path) {
-        return Ok(None);
+    match StoredRun::open(path)?.completeness()? {
+        Completeness::Finished => return Ok(None),
+        Completeness::WithoutWeights => observer.warn(&format!(
+            "{} was finished, and its weights are lost or damaged since: its last checkpoint gives them again",
+            path.display()
+        )),
+        Completeness::Unfinished => {}
     }
     let Resumption {
         mut folder,
         config,
         checkpoint,
         damaged,
+        metrics_put_aside,
         earlier,
     } = RunFolder::resume(path, threads)?;
     for damage in damaged {
         observer.warn(&format!("{damage}; an earlier one is used"));
+    }
+    if let Some(aside) = metrics_put_aside {
+        observer.warn(&format!(
+            "the metrics are not those of the checkpoint: what is left of them is put aside as {}, and no rows before this point are known any more",
+            aside.display()
+        ));
     }
     if let Some(earlier) = earlier {
         observer.warn(&format!(
@@ -114,23 +142,38 @@ pub fn resume(
         ));
     }
     let world = world(&config)?;
-    let trainer = match checkpoint {
-        Some(checkpoint) => Trainer::resumed(&config, &world, threads, &checkpoint)?,
-        None => Trainer::in_world(&config, &world, threads)?,
+    let made = {
+        let (own, asked) = (config.clone(), stop.clone());
+        let make = move || -> Result<_> {
+            let trainer = match checkpoint {
+                Some(checkpoint) => Trainer::resumed(&own, &world, threads, &checkpoint)?,
+                None => Trainer::in_world(&own, &world, threads)?,
+            };
+            Ok(Reporting::new(trainer, &own, &asked))
+        };
+        Apart::start(make, stop)
     };
-    let mut training = Reporting::new(trainer, &config, stop);
-    train_into(&mut folder, &mut training, &config, stop, observer).map(Some)
+    let Ok(training) = made else {
+        folder.set_status(Status::Interrupted)?;
+        return Err(interrupted(path, latest_row(path).steps_env));
+    };
+    train_into(&mut folder, &mut training?, &config, stop, observer).map(Some)
+}
+
+/// That the run at `path` was asked to stop.
+fn interrupted(path: &Path, steps_env: u64) -> RunError {
+    let folder = path.to_owned();
+    RunError::Interrupted { folder, steps_env }
 }
 
 /// Trains to the end, or until asked to stop.
-fn train_into(
+fn train_into<T: Training>(
     folder: &mut RunFolder,
-    training: &mut impl Training,
+    training: &mut Apart<T>,
     config: &Config,
     stop: &StopRequest,
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
-    observer.begin(&training.standing());
     let outcome = continue_into(folder, training, config, stop, observer);
     observer.end();
     let recorded = folder.set_status(match &outcome {
@@ -144,29 +187,62 @@ fn train_into(
     Ok(summary)
 }
 
-fn continue_into(
+/// A run's checkpoint as it was before an update that may have to be given up.
+struct Snapshot {
+    iterations: u64,
+    checkpoint: Checkpoint,
+}
+
+impl Snapshot {
+    fn of(training: &impl Training) -> Self {
+        Self {
+            iterations: training.iterations(),
+            checkpoint: training.checkpoint(),
+        }
+    }
+
+    /// Writes it, unless that takes too long when a stop was asked for: then the run goes on from the checkpoint before.
+    fn write_in_time(&self, folder: &mut RunFolder) -> Result<()> {
+        let Checkpoint { tensors, counters } = &self.checkpoint;
+        if tensors.len() + counters.len() > QUICKLY_WRITTEN {
+            return Ok(());
+        }
+        folder.write_checkpoint(self.iterations, &self.checkpoint)
+    }
+}
+
+fn continue_into<T: Training>(
     folder: &mut RunFolder,
-    training: &mut impl Training,
+    training: &mut Apart<T>,
     config: &Config,
     stop: &StopRequest,
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
     let start = Instant::now();
-    let steps_env_before = training.standing().steps_env;
+    let mut standing = training.complete(|training| training.standing());
+    observer.begin(&standing);
+    let steps_env_before = standing.steps_env;
     if config.run.tensorboard {
         folder.write_events(steps_env_before)?;
     }
     let interval = config.run.checkpoint_interval_steps_env;
     let mut intervals = steps_env_before / interval;
-    while !training.finished() {
+    let mut snapshot: Option<Snapshot> = None;
+    while !training.complete(|training| training.finished()) {
         if stop.is_made() {
-            folder.write_checkpoint(training.iterations(), &training.checkpoint())?;
-            return Err(RunError::Interrupted {
-                folder: folder.path().to_owned(),
-                steps_env: training.standing().steps_env,
-            });
+            if let Ok(snapshot) = training.ask(stop, |training| Snapshot::of(training)) {
+                snapshot.write_in_time(folder)?;
+            }
+            return Err(interrupted(folder.path(), standing.steps_env));
         }
-        let Update { metrics, standing } = match training.update() {
+        let began = Instant::now();
+        let Ok(update) = training.ask(stop, |training| training.update()) else {
+            if let Some(snapshot) = &snapshot {
+                Snapshot::write_in_time(snapshot, folder)?;
+            }
+            return Err(interrupted(folder.path(), standing.steps_env));
+        };
+        let metrics = match update {
             // What was begun was given up; the checkpoint is that of the moment before.
             Err(mackrl::Error::Stopped) => continue,
             Err(mackrl::Error::NotFinite(number)) => {
@@ -175,7 +251,11 @@ fn continue_into(
                     folder: folder.path().to_owned(),
                 });
             }
-            outcome => outcome?,
+            outcome => {
+                let update = outcome?;
+                standing = update.standing;
+                update.metrics
+            }
         };
         if let Some(metrics) = metrics {
             folder.append_metrics(&metrics)?;
@@ -183,13 +263,25 @@ fn continue_into(
         observer.progress(&standing);
         if standing.steps_env / interval > intervals {
             intervals = standing.steps_env / interval;
-            folder.write_checkpoint(training.iterations(), &training.checkpoint())?;
+            let Snapshot {
+                iterations,
+                checkpoint,
+            } = training.complete(|training| Snapshot::of(training));
+            folder.write_checkpoint(iterations, &checkpoint)?;
         }
+        // The next update may take as long, and have to be given up.
+        snapshot = if began.elapsed() < PATIENCE / 2 {
+            None
+        } else {
+            training.ask(stop, |training| Snapshot::of(training)).ok()
+        };
     }
-    folder.write_checkpoint(training.iterations(), &training.checkpoint())?;
-    folder.write_weights(&training.weights())?;
+    let (last, weights) =
+        training.complete(|training| (Snapshot::of(training), training.weights()));
+    folder.write_checkpoint(last.iterations, &last.checkpoint)?;
+    folder.write_weights(&weights)?;
     let wall_s = start.elapsed().as_secs_f64();
-    let steps_env = training.standing().steps_env;
+    let steps_env = standing.steps_env;
     Ok(Summary {
         folder: folder.path().to_owned(),
         steps_env,
@@ -208,7 +300,7 @@ struct Update {
 }
 
 /// Something that learns from one batch of episodes after the other.
-trait Training {
+trait Training: Send + 'static {
     /// Plays and learns from one batch.
     fn update(&mut self) -> Result<Update, mackrl::Error>;
     /// Whether the configured number of steps has been played.
@@ -358,13 +450,19 @@ mod tests {
         }
     }
 
-    fn run(mut training: Counting) -> (tempfile::TempDir, PathBuf, Result<Summary>) {
+    fn run(training: Counting) -> (tempfile::TempDir, PathBuf, Result<Summary>) {
         let parent = tempfile::tempdir().unwrap();
         let path = parent.path().join("run");
         let mut config = Config::default();
         config.run.checkpoint_interval_steps_env = 2;
         let mut folder = RunFolder::create(&path, &config, 1).unwrap();
         let stop = training.stop.clone();
+        let mut training = Apart::start(
+            move || -> Result<_> { Ok(training) },
+            &StopRequest::default(),
+        )
+        .unwrap()
+        .unwrap();
         let outcome = train_into(&mut folder, &mut training, &config, &stop, &mut ());
         (parent, path, outcome)
     }

@@ -79,6 +79,8 @@ fn its_agents_alone_do_what_the_central_run_does() {
         policy: algorithm.policy(),
         parameters: algorithm.parameters(),
         environment: &mut *environment,
+        repetition: Repetition::Exact,
+        isolation: Isolation::None,
         links: &mut links,
         seed: 1,
         sampled: algorithm.behaviour(0),

@@ -97,7 +97,9 @@ fn collect(
 /// The names of the files in a folder that are named as those that are kept of runs.
 fn kept_files(folder: &Path) -> Vec<OsString> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let kept = entries.filter(|entry| is_kept(&entry.path()));
+    // A link that was found, and not named, could lead to anything.
+    let is_plain = |entry: &fs::DirEntry| entry.file_type().is_ok_and(|kind| kind.is_file());
+    let kept = entries.filter(|entry| is_plain(entry) && is_kept(&entry.path()));
     let mut names: Vec<OsString> = kept.map(|entry| entry.file_name()).collect();
     names.sort();
     names

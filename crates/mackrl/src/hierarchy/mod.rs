@@ -191,4 +191,10 @@ impl Policy for Hierarchy {
     fn executor(&self, agent: AgentId) -> Box<dyn Executor> {
         Box::new(AgentExecutor::new(Arc::clone(&self.parts), agent))
     }
+
+    fn draws_when_greedy(&self) -> bool {
+        let declaration = &self.parts.declaration;
+        let mut levels = declaration.levels().iter();
+        !declaration.is_fixed() || levels.any(|level| level.divisions > 1 && !level.is_learned())
+    }
 }

@@ -110,6 +110,12 @@ pub trait Policy: Send + Sync + Debug {
 
     /// Working memory for `agent` alone.
     fn executor(&self, agent: AgentId) -> Box<dyn Executor>;
+
+    /// Whether the key of an episode decides anything in greedy play, such as which partition is in force. If it does not, another
+    /// key has to lead to the same actions, which the certificate checks.
+    fn draws_when_greedy(&self) -> bool {
+        true
+    }
 }
 
 /// Plays a team in several environments at once.
@@ -150,6 +156,13 @@ pub trait Actor: Send {
     /// What the controllers of environment `b` read at the latest step.
     fn controller_inputs(&self, experience: &Experience, b: usize) -> Vec<ControllerInput>;
 
+    /// The log-probabilities that the controllers of environment `b` gave at the latest step, of those that were asked. Nothing,
+    /// for actors that keep none.
+    fn controller_outputs(&self, experience: &Experience, b: usize) -> Vec<ControllerOutput> {
+        let _ = (experience, b);
+        Vec::new()
+    }
+
     /// What the controllers of environment `b` computed at the latest step, which was `situation` and led to `action_n` \[N\].
     /// Nothing, for actors that have no controllers to look into.
     fn thought(&mut self, b: usize, situation: Situation<'_>, action_n: &[Action]) -> Thought {
@@ -176,6 +189,11 @@ pub trait Executor: Send {
 
     /// What this agent's controllers read at the latest step.
     fn controller_inputs(&self) -> Vec<ControllerInput>;
+
+    /// The log-probabilities that this agent's controllers gave at the latest step; as [`Actor::controller_outputs`].
+    fn controller_outputs(&self) -> Vec<ControllerOutput> {
+        Vec::new()
+    }
 }
 
 /// Names one controller: its level's name, and whose it is.
@@ -195,4 +213,13 @@ pub struct ControllerInput {
     pub controller: ControllerId,
     /// The numbers, in the order of the controller's encoding.
     pub values: Vec<f32>,
+}
+
+/// What one controller gave at one step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ControllerOutput {
+    /// Whose output.
+    pub controller: ControllerId,
+    /// The logarithms of the probabilities of its choices \[C\].
+    pub log_p: Vec<f32>,
 }
