@@ -219,7 +219,7 @@ trait Training {
     fn iterations(&self) -> u64;
     /// Everything that the rest of the run depends on.
     fn checkpoint(&self) -> Checkpoint;
-    /// The weights as safetensors.
+    /// The weights as safetensors, with what they are.
     fn weights(&self) -> Vec<u8>;
 }
 
@@ -289,7 +289,7 @@ impl Training for Reporting {
     }
 
     fn weights(&self) -> Vec<u8> {
-        self.trainer.weights()
+        self.trainer.described_weights()
     }
 }
 

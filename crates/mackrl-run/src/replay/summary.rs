@@ -5,11 +5,11 @@ use std::fmt;
 use mackrl_skirmish::BattleStatistics;
 use serde::Serialize;
 
-use super::Opened;
+use super::{Playback, Replay};
 
 /// How an episode went.
 #[derive(Debug, Serialize)]
-pub(crate) struct Summary {
+pub struct Summary {
     map: String,
     policy: String,
     seed: u64,
@@ -24,11 +24,9 @@ pub(crate) struct Summary {
 }
 
 impl Summary {
-    /// Of a replay.
-    pub(crate) fn of(opened: &Opened) -> Self {
-        let Opened {
-            replay, playback, ..
-        } = opened;
+    /// Of a replay that was played again.
+    #[must_use]
+    pub fn of(replay: &Replay, playback: &Playback) -> Self {
         let BattleStatistics {
             battle_won,
             dead_allies,
@@ -51,7 +49,8 @@ impl Summary {
 
 impl Summary {
     /// How it ended.
-    pub(super) fn outcome(&self) -> String {
+    #[must_use]
+    pub fn outcome(&self) -> String {
         format!(
             "{} after {} steps, return {:.2}, allies lost: {}, enemies lost: {}",
             if self.battle_won { "won" } else { "not won" },
