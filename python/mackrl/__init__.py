@@ -4,6 +4,7 @@
 interfaces stand in modules of their own: ``mackrl.smac``, ``mackrl.pettingzoo``, ``mackrl.gymnasium``.
 """
 
+from . import policy
 from ._native import VERSION as __version__
 from ._native import maps
 from .arrays import Buffers, Spec, Step
@@ -27,5 +28,6 @@ __all__ = [
     "check_world",
     "maps",
     "play",
+    "policy",
     "train",
 ]

@@ -96,6 +96,9 @@ class VectorEnv:
         b = self.num_envs
         if seed is None and not self._is_begun:
             seed = 0
+        for one in [seed] if isinstance(seed, (int, np.integer)) else seed or []:
+            if not 0 <= one < 2**64:
+                raise ValueError(f"seed is {one}, expected an integer in [0, 2**64)")
         keys: list[tuple[int, int]] | None = None
         stride = 1
         if isinstance(seed, (int, np.integer)):

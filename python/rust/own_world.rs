@@ -31,6 +31,8 @@ use crate::configuration::Layers;
 
 /// The name by which configurations call this kind.
 const PYTHON: &str = "python";
+/// What panics of a world's methods say that have no other way to fail.
+pub(crate) const OF_THE_WORLD: &str = "of the world failed";
 
 declare_settings! {
     /// Which world.
@@ -436,7 +438,7 @@ impl PriorKnowledge for PythonKnowledge {
                 .call_method1("sees", arguments)?
                 .extract()
         });
-        seen.unwrap_or_else(|error| panic!("sees() of the world failed: {error}"))
+        seen.unwrap_or_else(|error| panic!("sees() {OF_THE_WORLD}: {error}"))
     }
 
     fn available(&self, known: KnownEntities<'_>, agent: AgentId, available_a: &mut [bool]) {
@@ -446,7 +448,7 @@ impl PriorKnowledge for PythonKnowledge {
         }
         debug_assert!(agent.index() < self.agents, "an agent of this world");
         if let Err(error) = Self::available(self, known, agent, available_a) {
-            panic!("available() of the world failed: {error}");
+            panic!("available() {OF_THE_WORLD}: {error}");
         }
     }
 
@@ -457,8 +459,7 @@ impl PriorKnowledge for PythonKnowledge {
                 .call_method1("action_on", (entity.index(),))?
                 .extract()
         });
-        let action =
-            action.unwrap_or_else(|error| panic!("action_on() of the world failed: {error}"));
+        let action = action.unwrap_or_else(|error| panic!("action_on() {OF_THE_WORLD}: {error}"));
         action.map(Action::new)
     }
 }

@@ -19,7 +19,8 @@ use pyo3::prelude::*;
 
 use crate::{
     configuration::Layers,
-    errors::{IntoException, learning},
+    errors::{IntoException, learning, world_failed},
+    own_world::OF_THE_WORLD,
 };
 
 /// How long an interruption by the user may wait to be seen.
@@ -116,7 +117,15 @@ fn watched<T: Send>(
             (worker.join(), interruption)
         })
     });
-    let outcome = outcome.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+    let outcome = match outcome {
+        Ok(outcome) => outcome,
+        // What a world of the user's raises where nothing can be returned.
+        Err(panic) => match panic.downcast::<String>() {
+            Ok(text) if text.contains(OF_THE_WORLD) => return Err(world_failed(*text)),
+            Ok(text) => std::panic::resume_unwind(text),
+            Err(panic) => std::panic::resume_unwind(panic),
+        },
+    };
     match (outcome, interruption) {
         // What the user did says more than that the run stopped for it.
         (Err(error), Some(interruption)) if error.is_interruption() => Err(interruption),

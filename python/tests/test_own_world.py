@@ -94,6 +94,18 @@ def test_a_team_is_trained_and_its_run_opened_again(tmp_path: Path) -> None:
     assert central.act(shown).shape == (3, 2) and team.spec.name == "lamp"
 
 
+class Forgetful(Lamp):
+    """A lamp whose common knowledge fails."""
+
+    def available(self, known: mackrl.worlds.Known, agent: int) -> np.ndarray:
+        raise KeyError("planted")
+
+
+def test_a_world_that_fails_in_training_is_told(tmp_path: Path) -> None:
+    with pytest.raises(mackrl.WorldFailed, match="available\\(\\) of the world failed: KeyError: 'planted'"):
+        mackrl.train(Forgetful, out=tmp_path / "lamp", threads=1, **TRAINED)  # type: ignore[arg-type]
+
+
 def test_a_class_that_cannot_be_found_is_named() -> None:
     from mackrl._native import Layers, Worlds
 

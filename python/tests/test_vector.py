@@ -163,6 +163,8 @@ def test_wrong_arrays_are_refused_by_name_type_and_shape() -> None:
         closed.reset()
     with pytest.raises(ValueError, match="no episode has begun"):
         VectorEnv("3m").step(np.ones((1, 3), np.int64))
+    with pytest.raises(ValueError, match="seed is -1, expected an integer in"):
+        VectorEnv("3m").reset(seed=-1)
     with pytest.raises(ValueError, match="did you mean `3m`"):
         VectorEnv("3n")
     with pytest.raises(ValueError, match="`env.sight_range` is -3.0, expected a number in"):
