@@ -40,15 +40,6 @@ pub(crate) struct Sourced<T> {
     pub(crate) result: T,
 }
 
-/// How an episode ended, in words.
-pub(crate) const fn outcome(battle_won: bool, timed_out: bool) -> &'static str {
-    match (battle_won, timed_out) {
-        (true, _) => "won",
-        (false, true) => "out of time",
-        (false, false) => "not won",
-    }
-}
-
 /// Lays out rows of cells in columns: the first to the left, the others to the right. The first row is the heading.
 pub(crate) fn table(rows: &[Vec<String>]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);

@@ -311,7 +311,7 @@ trait Training: Send + 'static {
     fn iterations(&self) -> u64;
     /// Everything that the rest of the run depends on.
     fn checkpoint(&self) -> Checkpoint;
-    /// The weights as safetensors.
+    /// The weights as safetensors, with what they are.
     fn weights(&self) -> Vec<u8>;
 }
 
@@ -381,7 +381,7 @@ impl Training for Reporting {
     }
 
     fn weights(&self) -> Vec<u8> {
-        self.trainer.weights()
+        self.trainer.described_weights()
     }
 }
 

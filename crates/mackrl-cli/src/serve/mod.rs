@@ -21,7 +21,7 @@ use anyhow::Context;
 
 use crate::{
     output,
-    replay::{Opened, page},
+    replay::Opened,
     serve::{
         http::{Request, Response},
         runs::Served,
@@ -119,7 +119,7 @@ fn route(path: &str, served: &Served) -> Response {
 }
 
 fn replay(path: &std::path::Path) -> Response {
-    let written = Opened::read(path).and_then(|opened| page(&opened, 0));
+    let written = Opened::read(path).map(|opened| opened.page(0));
     match written {
         Ok(page) => Response::html(page.into_bytes()),
         Err(error) => Response::error(500, &format!("{error:#}")),

@@ -17,8 +17,8 @@ use crate::{
     experience::Experience,
     marginalisation::{MarginalGradient, log_likelihood_with_gradient},
     policy::{
-        Actor, ControllerInput, ControllerOutput, Parameters, Recording, Sampler, Situation, Tally,
-        Thought,
+        Actor, ControllerInput, ControllerOutput, Parameters, PolicyTable, Recording, Sampler,
+        Situation, Tally, Thought,
     },
 };
 
@@ -156,6 +156,12 @@ impl Actor for TeamActor {
 
     fn controller_outputs(&self, experience: &Experience, b: usize) -> Vec<ControllerOutput> {
         self.controllers.outputs(experience, b)
+    }
+
+    fn table(&mut self, b: usize, situation: Situation<'_>) -> Option<PolicyTable<'_, f32>> {
+        let Controllers { parts, tables, .. } = &mut self.controllers;
+        let decision = tables[b].decision(parts, &situation.keys[b], situation.step);
+        Some(decision.table)
     }
 
     fn thought(&mut self, b: usize, situation: Situation<'_>, action_n: &[Action]) -> Thought {

@@ -40,7 +40,7 @@ use self::{actor::TeamActor, bank::Bank, executor::AgentExecutor};
 use crate::{
     common_knowledge::CommonKnowledgeFeatures,
     nn::{ParameterLayout, RecurrentWeights},
-    policy::{Actor, Declaration, Executor, Parameters, Policy},
+    policy::{Actor, ControllerDescription, Declaration, Executor, Parameters, Part, Policy, TEAM},
 };
 
 /// What the controllers of a hierarchy are made of.
@@ -156,6 +156,23 @@ impl Parts {
 impl Policy for Hierarchy {
     fn layout(&self) -> &ParameterLayout {
         &self.parts.layout
+    }
+
+    fn description(&self) -> Vec<ControllerDescription> {
+        let levels = self.parts.declaration.levels().iter();
+        let banks = levels.zip(&self.parts.banks);
+        let learned = banks.filter_map(|(level, bank)| Some((level, bank.as_ref()?)));
+        learned.map(|(level, bank)| bank.describe(level)).collect()
+    }
+
+    fn partitions(&self) -> Vec<Vec<Vec<AgentId>>> {
+        let declaration = &self.parts.declaration;
+        let divisions = declaration.levels()[TEAM].divisions_gd.first();
+        let members = |part: &Part| declaration.members(*part).to_vec();
+        let divided = divisions.into_iter().flatten();
+        divided
+            .map(|division| division.parts.iter().map(members).collect())
+            .collect()
     }
 
     fn initialise(&self, seed: u64) -> Vec<f32> {

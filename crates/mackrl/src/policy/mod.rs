@@ -102,6 +102,18 @@ pub trait Policy: Send + Sync + Debug {
     /// Names and shapes of the parameters.
     fn layout(&self) -> &ParameterLayout;
 
+    /// What the networks are made of and what they read, for those who compute with the weights alone; nothing, for a policy
+    /// without networks.
+    fn description(&self) -> Vec<ControllerDescription> {
+        Vec::new()
+    }
+
+    /// The partitions that a team chooses from \[P\]\[groups\]\[members\], in the order of the selector's columns; nothing, where
+    /// they change from step to step or there is no choice.
+    fn partitions(&self) -> Vec<Vec<Vec<AgentId>>> {
+        Vec::new()
+    }
+
     /// Random initial parameters, a function of `seed`.
     fn initialise(&self, seed: u64) -> Vec<f32>;
 
@@ -163,6 +175,13 @@ pub trait Actor: Send {
         Vec::new()
     }
 
+    /// All log-probabilities of environment `b` at the latest step, which was `situation`; nothing, for actors without a
+    /// hierarchy.
+    fn table(&mut self, b: usize, situation: Situation<'_>) -> Option<PolicyTable<'_, f32>> {
+        let _ = (b, situation);
+        None
+    }
+
     /// What the controllers of environment `b` computed at the latest step, which was `situation` and led to `action_n` \[N\].
     /// Nothing, for actors that have no controllers to look into.
     fn thought(&mut self, b: usize, situation: Situation<'_>, action_n: &[Action]) -> Thought {
@@ -194,6 +213,25 @@ pub trait Executor: Send {
     fn controller_outputs(&self) -> Vec<ControllerOutput> {
         Vec::new()
     }
+}
+
+/// The network that the controllers of one level share: Linear and `ReLU`, a gated recurrent unit, Linear, masked log-softmax.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ControllerDescription {
+    /// As the tensors of its network begin: `pair_controller`.
+    pub name: &'static str,
+    /// The members of each group \[G\]\[members\].
+    pub groups: Vec<Vec<AgentId>>,
+    /// What stands in a row of inputs, one behind the other, and how many numbers each has.
+    pub inputs: Vec<(&'static str, usize)>,
+    /// H: units of the first layer and of the recurrent unit.
+    pub hidden: usize,
+    /// Ways to divide: the first columns of a row of outputs.
+    pub divisions: usize,
+    /// Joint actions, which follow them: of members (i, j) column i·A + j.
+    pub joint_actions: usize,
+    /// Whether exploration is mixed into its choices.
+    pub explores: bool,
 }
 
 /// Names one controller: its level's name, and whose it is.
