@@ -6,21 +6,19 @@ use super::{Ended, cases, copy, ended, files, random, signal};
 use crate::support::{exits, mackrl, outcome, resume, train};
 
 /// Commands that read a run, with what they are asked; `RUN` stands for its folder, `COPY` for an undamaged one.
-const READERS: [&[&str]; 6] = [
+const READERS: [&[&str]; 5] = [
     &["evaluate", "RUN", "--episodes", "2", "--json"],
     &["certify", "RUN", "--episodes", "1", "--json"],
     &["report", "RUN", "--json", "--resamples", "100"],
-    &["plot", "RUN", "-o", "/dev/null", "--json"],
+    &["plot", "RUN", "-o", "COPY.svg", "--json"],
     &["diff", "RUN", "COPY", "--no-replay", "--json"],
-    &["sweep", "PLAN", "--list", "--json"],
 ];
 
 fn reader(words: &[&str], run: &Path, other: &Path) -> Command {
     let words: Vec<String> = (words.iter())
         .map(|word| match *word {
             "RUN" => run.display().to_string(),
-            "COPY" => other.display().to_string(),
-            word => word.to_owned(),
+            word => word.replace("COPY", &other.display().to_string()),
         })
         .collect();
     mackrl(&words.iter().map(String::as_str).collect::<Vec<_>>())
@@ -70,7 +68,7 @@ fn no_damage_to_a_finished_run_changes_a_number_in_silence() {
         ),
         0,
     );
-    let readers = &READERS[..5];
+    let readers = &READERS;
     copy(&whole, &run);
     let expected: Vec<Ended> = readers
         .iter()
@@ -81,7 +79,7 @@ fn no_damage_to_a_finished_run_changes_a_number_in_silence() {
     }
     let mut random = random("bytes");
     let names = files(&whole);
-    let count = cases(30);
+    let count = cases(18);
     let mut refused = 0;
     for case in 0..count {
         let name = names[case % names.len()]
@@ -132,7 +130,7 @@ fn no_damage_to_the_metrics_of_an_interrupted_run_costs_it_its_checkpoint() {
     let code = child.wait().expect("a child can be waited for").code();
     assert_eq!(code, Some(75));
     let mut random = random("metrics");
-    let count = cases(8);
+    let count = cases(5);
     for case in 0..count {
         let _ = fs::remove_dir_all(&run);
         copy(&stopped, &run);

@@ -1,6 +1,10 @@
 //! The same bits on every instruction set, and for runs that cross from one to another and back.
 
-use std::{env, path::PathBuf, process::Command};
+use std::{
+    env,
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+};
 
 use super::{cases, random, signal};
 use crate::support::{checkpoints, exits, outcome, resume, train_on, uninterrupted, wait_until};
@@ -31,9 +35,13 @@ fn programs() -> Vec<PathBuf> {
 }
 
 /// The command as another program.
-fn by(program: &PathBuf, command: &Command) -> Command {
+fn by(program: &Path, command: &Command) -> Command {
     let mut other = Command::new(program);
-    other.args(command.get_args());
+    other
+        .args(command.get_args())
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped());
     other
 }
 
@@ -79,7 +87,6 @@ fn a_run_that_crosses_instruction_sets_builds_and_threads_gives_the_same_bits() 
                 {
                     let mut command = by(&program, &resume(&run, threads));
                     command.env("MACKRL_SIMD", set);
-                    command.stderr(std::process::Stdio::piped());
                     command
                 },
                 0,

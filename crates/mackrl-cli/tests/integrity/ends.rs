@@ -106,7 +106,7 @@ fn words_that_are_no_text_and_names_that_control_terminals_do_no_harm() {
             &["evaluate", "--episodes", "1"],
             &["resume", "--threads", "1"],
             &["report"],
-            &["plot", "-o", "/dev/null"],
+            &["plot", "-o", "/tmp/x.svg"],
             &["maps", "--check"],
             &["sweep", "--list"],
             &["diff", "x"],

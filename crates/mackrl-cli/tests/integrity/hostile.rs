@@ -23,7 +23,7 @@ const COMMANDS: [&str; 12] = [
     "certify RUN --episodes 1",
     "resume RUN --threads 1",
     "report RUN --unfinished --resamples 100",
-    "plot RUN --unfinished -o /dev/null",
+    "plot RUN --unfinished -o COPY.svg",
     "diff RUN COPY --no-replay",
     "diff COPY RUN --no-replay",
     "diff RUN/checkpoints COPY/checkpoints",

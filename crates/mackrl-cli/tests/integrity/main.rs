@@ -67,7 +67,7 @@ fn ended(mut command: Command, limit: Duration) -> Ended {
         }
         std::thread::sleep(Duration::from_millis(2));
     };
-    let mut text = |file: &mut fs::File| {
+    let text = |file: &mut fs::File| {
         let mut bytes = Vec::new();
         file.rewind().expect("a file can be rewound");
         file.read_to_end(&mut bytes).expect("a file can be read");

@@ -6,8 +6,8 @@ use super::{cases, random, signal};
 use crate::support::{Outcome, exits, outcome, resume, train};
 
 /// Settings that make a run last for about a second.
-const LONGER: [&str; 1] = ["run.steps_env=12000"];
-const OTHER: [&str; 2] = ["run.steps_env=12000", "run.seed=4"];
+const LONGER: [&str; 1] = ["run.steps_env=6000"];
+const OTHER: [&str; 2] = ["run.steps_env=6000", "run.seed=4"];
 
 fn reference(settings: &[&str]) -> Outcome {
     let parent = tempfile::tempdir().expect("a folder for the run");
@@ -20,13 +20,13 @@ fn reference(settings: &[&str]) -> Outcome {
 fn a_run_whose_folder_another_run_took_leaves_it_alone() {
     let expected = reference(&OTHER);
     let mut random = random("writers");
-    let count = cases(6);
+    let count = cases(3);
     let mut met = 0;
     for case in 0..count {
         let parent = tempfile::tempdir().expect("a folder for runs");
         let run = parent.path().join("run");
-        let mut old = train(&run, &LONGER).spawn().expect("the program starts");
-        thread::sleep(Duration::from_millis(random.u64(50..700)));
+        let old = train(&run, &LONGER).spawn().expect("the program starts");
+        thread::sleep(Duration::from_millis(random.u64(50..400)));
         match random.u8(0..3) {
             0 => drop(fs::rename(&run, parent.path().join("moved"))),
             1 => drop(fs::remove_dir_all(&run)),
@@ -38,7 +38,7 @@ fn a_run_whose_folder_another_run_took_leaves_it_alone() {
             }
         }
         let mut new = train(&run, &OTHER).spawn().expect("the program starts");
-        thread::sleep(Duration::from_millis(random.u64(0..500)));
+        thread::sleep(Duration::from_millis(random.u64(0..300)));
         let kind = random.choice(["TERM", "KILL"]).expect("one of two");
         signal(new.id(), kind);
         let new = new.wait().expect("a child can be waited for");
