@@ -131,7 +131,7 @@ fn explain(error: &anyhow::Error) -> String {
         |cause: &(dyn StdError + 'static)| matches!(cause.downcast_ref(), Some(Failure::Stdout(_)));
     let mut causes = error.chain().take_while(|cause| !is_of_stdout(*cause));
     if let Some(hint) = causes.find_map(|cause| verdict(cause).1) {
-        text.push_str(&format!("hint: {hint}\n"));
+        text.push_str(&format!("hint: {}\n", printable(&hint)));
     }
     text
 }
@@ -217,6 +217,7 @@ fn of_run(error: &RunError) -> Verdict {
     let (exit, hint) = match error {
         RunError::Config(error) => return verdict(&**error),
         RunError::Learning(error) => return of_library(error),
+        RunError::Within { source, .. } => return of_run(source),
         RunError::FolderInUse { .. } => (
             Exit::Usage,
             Some("choose another folder with --out, or move this one away".to_owned()),
@@ -344,7 +345,14 @@ mod tests {
         let config = Config::with(&["a=1"]).unwrap_err();
         let missing = io::Error::from(ErrorKind::NotFound);
         let folder = PathBuf::from("x");
-        let cases: [(anyhow::Error, Exit); 8] = [
+        let damaged = RunError::Within {
+            what: "cannot use x".to_owned(),
+            source: Box::new(RunError::BadData {
+                message: "x is damaged".to_owned(),
+            }),
+        };
+        let cases: [(anyhow::Error, Exit); 9] = [
+            (damaged.into(), Exit::Data),
             (config.clone().into(), Exit::Configuration),
             (mackrl::Error::from(config).into(), Exit::Configuration),
             (mackrl::Error::Data(String::new()).into(), Exit::Data),

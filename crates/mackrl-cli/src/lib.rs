@@ -14,6 +14,7 @@ mod plot;
 mod progress;
 mod replay;
 mod reproduce;
+#[cfg(feature = "serve")]
 mod serve;
 mod signals;
 

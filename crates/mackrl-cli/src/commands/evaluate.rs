@@ -19,7 +19,7 @@ use serde_json::Value;
 use crate::{
     args::EvaluateArgs,
     commands::sc2,
-    failure::Failure,
+    failure::{Failure, printable},
     output::{self, Sourced},
     progress::Meter,
 };
@@ -78,7 +78,7 @@ fn save_replays(folder: &Path, run: &Run, seed: u64, count: usize) -> anyhow::Re
     let _ = writeln!(
         io::stderr(),
         "{count} replays are in {}: see `mackrl replay FILE --html OUT`",
-        folder.join(REPLAYS).display()
+        printable(&folder.join(REPLAYS).display().to_string())
     );
     Ok(())
 }

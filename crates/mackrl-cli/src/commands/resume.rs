@@ -18,7 +18,7 @@ use super::train::print;
 use crate::{
     args::ResumeArgs,
     commands::{sc2, this_program},
-    failure::Failure,
+    failure::{Failure, printable},
     progress::{RunProgress, SweepProgress},
     signals,
 };
@@ -50,7 +50,7 @@ pub(super) fn go_on(
     let summary = training_loop::resume(path, sc2::world, threads, stop, &mut progress)?;
     if summary.is_none() {
         // Nothing is wrong: starting runs again until they are finished is one way to make them.
-        let folder = path.display();
+        let folder = printable(&path.display().to_string());
         let _ = writeln!(io::stderr(), "{folder} is finished: nothing is left to do");
     }
     Ok(summary)

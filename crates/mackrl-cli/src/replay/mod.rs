@@ -34,6 +34,15 @@ impl Opened {
         Self::of(Replay::from_bytes(&bytes).map_err(failed)?).map_err(|error| failed(error).into())
     }
 
+    /// Reads and plays the content of a file.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    #[cfg(feature = "serve")]
+    pub(crate) fn from_bytes(bytes: &[u8]) -> anyhow::Result<Self> {
+        Ok(Self::of(Replay::from_bytes(bytes)?)?)
+    }
+
     /// Plays a replay.
     pub(crate) fn of(replay: Replay) -> Result<Self, ReplayError> {
         let playback = replay.play()?;

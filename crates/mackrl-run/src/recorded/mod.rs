@@ -21,7 +21,7 @@ use crate::{
     training::headline,
 };
 pub use curve::{Axis, Measurements, final_mean, share_of};
-pub use find::find;
+pub use find::{find, locate, open};
 pub use grid::Gridded;
 pub use kept::TrainingRun;
 pub use series::{Grouping, Selection, Series, group};

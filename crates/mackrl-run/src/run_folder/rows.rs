@@ -4,14 +4,17 @@
 //! shares lie in [0, 1], and it names a provenance that `run.json` has.
 
 use std::{
-    io::{BufRead, BufReader, Read},
+    io::{BufRead, BufReader, Read, Seek, SeekFrom},
     path::Path,
 };
 
 use serde_json::{Map, Value};
 
 use super::{METRICS, manifest::Growing, stored::StoredRun};
-use crate::error::{Context, Result, RunError};
+use crate::{
+    error::{Context, Result, RunError},
+    folder::Folder,
+};
 
 /// A row of metrics.
 pub type Row = Map<String, Value>;
@@ -139,6 +142,63 @@ impl StoredRun {
             _ => Ok(()),
         }
     }
+}
+
+/// Rows from some place in the metrics on, for one who follows a run as it goes.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Following {
+    /// The rows that can be used.
+    pub rows: Vec<Row>,
+    /// The byte to go on from.
+    pub next: u64,
+    /// Why rows were left out, of the last of them.
+    pub problem: Option<String>,
+}
+
+/// Reads the whole lines among the next `bytes_max` bytes of the metrics of the run at `path`, from byte `from` on. What cannot be a
+/// row is left out and told; nothing, if there are not so many bytes.
+///
+/// # Errors
+/// If there is no such folder, the metrics are no plain file, or they cannot be read.
+pub fn follow_rows(path: &Path, from: u64, bytes_max: u64) -> Result<Option<Following>> {
+    let folder = Folder::open(path)?;
+    let Some(mut file) = folder.file(METRICS)? else {
+        return Ok((from == 0).then(Following::default));
+    };
+    let cannot = || folder.cannot("read", Path::new(METRICS));
+    let length = file.metadata().with_context(cannot)?.len();
+    if from > length {
+        return Ok(None);
+    }
+    file.seek(SeekFrom::Start(from)).with_context(cannot)?;
+    let mut bytes = Vec::new();
+    file.take(bytes_max)
+        .read_to_end(&mut bytes)
+        .with_context(cannot)?;
+    let mut following = Following::default();
+    let whole = bytes.iter().rposition(|byte| *byte == b'\n');
+    let whole = match whole {
+        Some(end) => end + 1,
+        // A row that is as long as all that is read will not come to an end.
+        None if bytes.len() as u64 == bytes_max => {
+            following.problem = Some(format!("a row is longer than {bytes_max} bytes"));
+            bytes.len()
+        }
+        None => 0,
+    };
+    following.next = from + whole as u64;
+    let mut check = RowCheck::default();
+    for line in bytes[..whole].split(|byte| *byte == b'\n') {
+        if line.is_empty() {
+            continue;
+        }
+        let row = serde_json::from_slice::<Row>(line).map_err(|error| error.to_string());
+        match row.and_then(|row| check.check(&row).map(|()| row)) {
+            Ok(row) => following.rows.push(row),
+            Err(reason) => following.problem = Some(format!("a row is left out: {reason}")),
+        }
+    }
+    Ok(Some(following))
 }
 
 #[cfg(test)]
