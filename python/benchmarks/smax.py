@@ -37,7 +37,10 @@ def play(carry):
 
 
 observed, state = jax.vmap(env.reset)(jax.random.split(jax.random.PRNGKey(0), worlds))
-carry, _ = jax.block_until_ready(play((state, observed, jax.random.PRNGKey(1))))
+carry = (state, observed, jax.random.PRNGKey(1))
+for _ in range(3):
+    # What comes out has types that what goes in first may not have: it is compiled twice.
+    carry, _ = jax.block_until_ready(play(carry))
 played, start = 0, time.process_time()
 while (spent := time.process_time() - start) < 3:
     carry, _ = jax.block_until_ready(play(carry))

@@ -41,23 +41,18 @@ class Battle(TaskClass):
         return Composite({"state": env.observation_spec["state"].clone()})
 
     def action_mask_spec(self, env):
-        spec = env.observation_spec.clone()
-        for key in list(spec.keys(True, True)):
-            if key[-1] != "action_mask":
-                del spec[key]
-        for group in env.group_map:
-            for name in [name for name in spec[group].keys() if name not in ("action_mask", "observation")]:
-                del spec[group, name]
-        return spec
+        return self.only("action_mask", env)
 
     def observation_spec(self, env):
+        return self.only("observation", env)
+
+    def only(self, name, env):
+        """What the groups observe under this name."""
         spec = env.observation_spec.clone()
         for group in self.group_map(env):
-            for name in list(spec[group].keys()):
-                if name != "observation":
-                    del spec[group, name]
-            if "action_mask" in spec[group, "observation"].keys():
-                del spec[group, "observation", "action_mask"]
+            for key in list(spec[group].keys()):
+                if key != name:
+                    del spec[group, key]
         del spec["state"]
         return spec
 

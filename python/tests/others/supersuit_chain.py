@@ -2,6 +2,7 @@
 
 from importlib.metadata import version
 
+import numpy as np
 import supersuit
 
 from mackrl.pettingzoo import parallel_env
@@ -12,7 +13,8 @@ def main() -> None:
     vector = supersuit.concat_vec_envs_v1(supersuit.pettingzoo_env_to_vec_env_v1(env), 2, base_class="gymnasium")
     vector.reset(seed=1)
     for _ in range(150):
-        observations, *_ = vector.step(vector.action_space.sample())
+        actions = np.array([vector.action_space.sample() for _ in range(vector.num_envs)])
+        observations, *_ = vector.step(actions)
     assert observations.shape == (6, 30)
     print("supersuit", version("supersuit"), "observations", observations.shape)
 
