@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use mackrl::decentralised::{AgentLink, InProcessAgent, Subject};
+use mackrl::decentralised::{AgentLink, InProcessAgent, Isolation, Repetition, Subject};
 use mackrl_env::AgentId;
 use mackrl_run::{
     config::{Config, ConfigBuilder, Registry},
