@@ -66,34 +66,21 @@ fn a_run_that_crosses_instruction_sets_builds_and_threads_gives_the_same_bits() 
             .env("MACKRL_SIMD", set)
             .spawn()
             .expect("the program starts");
-        loop {
-            let last = || {
-                checkpoints(&run)
-                    .pop()
-                    .map(|path| path.display().to_string())
-            };
-            if !wait_until(&mut child, || {
-                last().is_some_and(|last| last.ends_with(&format!("{updates:012}")))
-            }) {
-                break;
-            }
+        let named = format!("{updates:012}");
+        let has_come_so_far = || {
+            let last = checkpoints(&run).pop();
+            last.is_some_and(|last| last.ends_with(&named))
+        };
+        if wait_until(&mut child, has_come_so_far) {
             signal(child.id(), "TERM");
-            if child.wait().expect("a child can be waited for").code() == Some(0) {
-                break;
-            }
+        }
+        if child.wait().expect("a child can be waited for").code() != Some(0) {
             crossed += 1;
             let (set, program, threads, _) = pick();
-            exits(
-                {
-                    let mut command = by(&program, &resume(&run, threads));
-                    command.env("MACKRL_SIMD", set);
-                    command
-                },
-                0,
-            );
-            break;
+            let mut command = by(&program, &resume(&run, threads));
+            command.env("MACKRL_SIMD", set);
+            exits(command, 0);
         }
-        let _ = child.wait();
         assert!(outcome(&run) == expected, "case {case}");
     }
     println!(

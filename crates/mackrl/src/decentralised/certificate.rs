@@ -18,24 +18,19 @@
 //! The key that choices are drawn from is not the key of the world, so that an agent cannot compute the world's dice from what
 //! it is given.
 
-use mackrl_env::{
-    Action, AgentId, Draw, EntitySet, Environment, EnvironmentSpec, EpisodeKey, Observations,
-    StepError, Stream,
-};
+use mackrl_env::{Action, AgentId, Draw, Environment, EnvironmentSpec, Observations, StepError};
 
 use super::{
     alteration::{Kind, alter_unseen, is_same_view},
+    central::{Central, Keys},
     computed::{Compared, Computed, Difference},
     message::{Answer, Request, ViewMessage},
     report::{Certificate, Check, DifferingInput, Isolation, Place},
 };
 use crate::{
     Error,
-    experience::{ATTEMPTS_MAX, Experience},
-    policy::{
-        Actor, Behaviour, ControllerId, ControllerInput, Mode, Parameters, Policy, Recording,
-        Situation,
-    },
+    experience::ATTEMPTS_MAX,
+    policy::{Behaviour, ControllerId, ControllerInput, Mode, Parameters, Policy},
 };
 
 /// An agent that can be asked for its actions.
@@ -87,99 +82,6 @@ struct Recorded {
     observations_t: Vec<Observations>,
     actions_tn: Vec<Vec<Action>>,
     computed_tn: Vec<Vec<Computed>>,
-}
-
-/// The names of an episode.
-#[derive(Debug, Clone, Copy)]
-struct Keys {
-    /// From which the world draws.
-    world: EpisodeKey,
-    /// From which controllers draw; agents are told this one alone.
-    choices: EpisodeKey,
-    /// Another one, from which they might have drawn.
-    other: EpisodeKey,
-}
-
-impl Keys {
-    fn new(seed: u64, episode: u64) -> Self {
-        let derived = |number: usize| {
-            let name = EpisodeKey::new(seed, Stream::Other, 0);
-            EpisodeKey::new(
-                name.bits(0, Draw::Setup((1 << 27) + number)),
-                Stream::Other,
-                episode,
-            )
-        };
-        Self {
-            world: EpisodeKey::new(seed, Stream::Evaluation, episode),
-            choices: derived(0),
-            other: derived(1),
-        }
-    }
-}
-
-/// The central run at work in one episode.
-struct Central<'a> {
-    actor: Box<dyn Actor>,
-    experience: Experience,
-    parameters: &'a Parameters,
-    agents: usize,
-}
-
-impl<'a> Central<'a> {
-    fn begin(policy: &dyn Policy, parameters: &'a Parameters, agents: usize) -> Self {
-        let mut actor = policy.actor(1);
-        let mut experience = Experience::default();
-        actor.begin(Recording::Off, &mut experience);
-        Self {
-            actor,
-            experience,
-            parameters,
-            agents,
-        }
-    }
-
-    /// Plays one step.
-    fn act(
-        &mut self,
-        step: usize,
-        key: &EpisodeKey,
-        observations: &Observations,
-        behaviour: Behaviour,
-    ) -> Result<Vec<Action>, Error> {
-        let mut action_n = vec![Action::default(); self.agents];
-        let situation = Situation {
-            step,
-            playing: &[0],
-            keys: std::slice::from_ref(key),
-            observations,
-            behaviour,
-        };
-        self.actor.act(
-            self.parameters,
-            situation,
-            &mut self.experience,
-            &mut action_n,
-        )?;
-        Ok(action_n)
-    }
-
-    fn inputs(&self) -> Vec<ControllerInput> {
-        self.actor.controller_inputs(&self.experience, 0)
-    }
-
-    /// What was computed at the latest step, which led to `action_n`, agent by agent; for the dead, who need no controllers, nothing.
-    fn computed(&self, observations: &Observations, action_n: &[Action]) -> Vec<Computed> {
-        let inputs = self.inputs();
-        let outputs = self.actor.controller_outputs(&self.experience, 0);
-        let agents = action_n.iter().enumerate();
-        agents
-            .map(|(agent, &action)| match observations.visible(0)[agent] {
-                EntitySet::EMPTY => Computed::without_controllers(action),
-                _ => Computed::of(AgentId::new(agent), action, &inputs, &outputs),
-            })
-            .collect()
-    }
 }
 
 impl Subject<'_, '_> {

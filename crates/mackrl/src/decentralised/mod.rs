@@ -5,6 +5,7 @@
 //! every action, and plays the central run again in worlds where everything that an agent does not see is different.
 
 mod alteration;
+mod central;
 mod certificate;
 mod computed;
 mod message;
