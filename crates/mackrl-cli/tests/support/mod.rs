@@ -15,6 +15,7 @@ const SMALL: &[&str] = &[
     "run.seed=3",
     "run.metrics_interval_steps_env=200",
     "run.checkpoint_interval_steps_env=1",
+    "algorithm.name=mackrl",
     "algorithm.hidden=8",
     "algorithm.environments=1",
     "algorithm.target_interval_updates=31",

@@ -44,7 +44,7 @@ impl Default for Registry {
 }
 
 impl Registry {
-    /// Everything that is shipped; what is chosen unless something else is named comes first.
+    /// Everything that is shipped; what is chosen where neither a preset nor a setting names something else comes first.
     #[must_use]
     pub fn built_in() -> Self {
         let registry = Self {
@@ -143,12 +143,12 @@ impl Registry {
         AlgorithmConfig::new(first.unwrap_or_else(|| Arc::new(algorithms::Mackrl)))
     }
 
-    /// All shipped presets, the recommended one first.
+    /// All shipped presets, `default` first, which is what we recommend.
     pub fn presets(&self) -> impl Iterator<Item = Preset> {
-        self.algorithms
-            .iter()
-            .flat_map(|kind| kind.presets())
-            .copied()
+        let presets = self.algorithms.iter().flat_map(|kind| kind.presets());
+        let mut presets: Vec<Preset> = presets.copied().collect();
+        presets.sort_by_key(|preset| preset.name != "default");
+        presets.into_iter()
     }
 
     /// The preset called `name`.
@@ -282,9 +282,10 @@ mod tests {
     }
 
     #[test]
-    fn the_default_preset_is_what_is_built_in() {
+    fn the_default_preset_has_what_is_built_in_into_the_algorithm_that_it_names() {
         let preset = ConfigBuilder::new(&Registry::built_in()).preset("default");
-        assert_eq!(preset.unwrap().build().unwrap(), Config::default());
+        let expected = Config::with(&["algorithm.name=mackrl-ppo"]).unwrap();
+        assert_eq!(preset.unwrap().build().unwrap(), expected);
     }
 
     #[test]

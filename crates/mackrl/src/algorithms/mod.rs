@@ -179,15 +179,15 @@ pub struct Preset {
     pub text: &'static str,
 }
 
-/// The algorithms of this crate, the recommended one first.
+/// The algorithms of this crate, the paper's own first. What we recommend is what preset `default` names.
 #[must_use]
 pub fn built_in() -> Vec<Arc<dyn AlgorithmKind>> {
     vec![
+        Arc::new(Mackrl),
+        Arc::new(CentralV),
         Arc::new(MackrlPpo),
         Arc::new(Mappo::default()),
         Arc::new(Ippo::default()),
-        Arc::new(Mackrl),
-        Arc::new(CentralV),
     ]
 }
 

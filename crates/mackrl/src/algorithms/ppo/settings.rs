@@ -49,10 +49,10 @@ declare_settings! {
         /// Environment steps over which step sizes and the weight of the entropy change linearly to what they are in the end.
         schedule_steps_env: u64 = 200_000, Accepts::integer(1, EXACT);
         /// What both step sizes are multiplied by in the end.
-        learning_rate_finish: f64 = 1.0, Accepts::above_within(0.0, 1.0);
+        learning_rate_finish: f64 = 0.3, Accepts::above_within(0.0, 1.0);
         /// Times that a batch is gone through. Each epoch is one step of the controllers and one of the critic on the whole batch;
         /// activations are computed anew, from the first step of each episode to the last.
-        epochs: usize = 5, Accepts::integer(1, 1000);
+        epochs: usize = 10, Accepts::integer(1, 1000);
         /// How far a group's ratio of probabilities may move from 1 before it gains nothing more. Where a ratio is that of the whole
         /// team, this is divided by the square root of the number of groups.
         clip: f64 = 0.2, Accepts::above_within(0.0, 1.0);
@@ -66,16 +66,16 @@ declare_settings! {
         lambda: f64 = 0.95, Accepts::within(0.0, 1.0);
         /// Weight of the entropy of what each group does, over all ways to it, beside its normalised advantage, at the first
         /// environment step.
-        entropy_weight: f64 = 0.05, Accepts::within(0.0, 1.0);
+        entropy_weight: f64 = 0.02, Accepts::within(0.0, 1.0);
         /// The same in the end.
-        entropy_weight_finish: f64 = 0.01, Accepts::within(0.0, 1.0);
+        entropy_weight_finish: f64 = 0.005, Accepts::within(0.0, 1.0);
         /// Longest gradient (Euclidean norm over all parameters of the policy, or of the critic); longer ones are shortened.
         gradient_norm_max: f64 = 10.0, Accepts::above(0.0);
         /// What the orthogonal initial weights of the controllers' last layers are multiplied by: small numbers make the first choices
         /// almost even.
         policy_gain: f64 = 0.01, Accepts::above_within(0.0, 100.0);
         /// Environments that run side by side; each gives one episode to an update.
-        environments: usize = 32, Accepts::integer(1, 4096);
+        environments: usize = 16, Accepts::integer(1, 4096);
         /// Pieces into which the environments are cut for work in parallel; as many threads as this can be used. It decides the
         /// last bits of a result, which the number of threads does not.
         shards: usize = 2, Accepts::integer(1, 4096);
