@@ -12,6 +12,7 @@ import argparse
 import json
 import os
 import platform
+import resource
 import subprocess
 import sys
 import time
@@ -46,10 +47,17 @@ def ours(map_name: str, worlds: int, draws: str, seconds: float) -> float:
 
 
 def program(binary: str, map_name: str) -> float:
-    """Steps a second of `mackrl bench env`, on one thread: the best of its parts."""
-    command = [binary, "bench", "env", "--map", map_name, "--threads", "1", "--steps", "400000", "--json"]
-    shown = subprocess.run(command, check=True, capture_output=True, text=True)
-    return float(json.loads(shown.stdout)["env_steps_per_s_best_part"])
+    """Steps of `mackrl bench env` in a CPU second, on one thread; its start is taken off by a shorter run."""
+    few, many = 50_000, 550_000
+    command = [binary, "bench", "env", "--map", map_name, "--threads", "1", "--json", "--steps"]
+
+    def spent(steps: int) -> float:
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run([*command, str(steps)], check=True, capture_output=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+    return (many - few) / (spent(many) - spent(few))
 
 
 def peer(python: str, script: str, map_name: str, worlds: int) -> float:
@@ -65,7 +73,7 @@ def main() -> None:
     parser.add_argument("--smax")
     parser.add_argument("--smaclite")
     parser.add_argument("--maps", nargs="+", default=["3m", "2s3z"])
-    parser.add_argument("--worlds", nargs="+", type=int, default=[1, 8, 64, 512])
+    parser.add_argument("--worlds", nargs="+", type=int, default=[64, 512, 8, 1])
     parser.add_argument("--seconds", type=float, default=2)
     parser.add_argument("--out", type=Path, required=True)
     typed = parser.parse_args()
@@ -77,8 +85,8 @@ def main() -> None:
         record = {"python": platform.python_version(), "machine": platform.machine(), "rows": rows}
         typed.out.write_text(json.dumps(record, indent=1) + "\n")
 
-    for map_name in typed.maps:
-        for worlds in typed.worlds:
+    for worlds in typed.worlds:
+        for map_name in typed.maps:
             measure("program", map_name, 1, program(typed.program, map_name))
             for draws in ("rust", "numpy"):
                 measure(f"ours, {draws} draws", map_name, worlds, ours(map_name, worlds, draws, typed.seconds))
@@ -86,8 +94,8 @@ def main() -> None:
                 measure("smax", map_name, worlds, peer(typed.smax, "smax.py", map_name, worlds))
                 measure("ours, rust draws", map_name, worlds, ours(map_name, worlds, "rust", typed.seconds))
             measure("program", map_name, 1, program(typed.program, map_name))
-        if typed.smaclite:
-            measure("smaclite", map_name, 1, peer(typed.smaclite, "smaclite_speed.py", map_name, 1))
+            if typed.smaclite and worlds == typed.worlds[0]:
+                measure("smaclite", map_name, 1, peer(typed.smaclite, "smaclite_speed.py", map_name, 1))
 
 
 if __name__ == "__main__":
