@@ -95,7 +95,7 @@ fn program() -> PathBuf {
 }
 
 fn star_craft(map: &str, pool: &Arc<GamePool>) -> StarCraft2 {
-    let units = UnitTypes::load(UnitData::Liberty).expect("shipped statistics");
+    let units = UnitTypes::load(UnitData::default()).expect("shipped statistics");
     let scenario = Scenario::shipped(map, &units)
         .expect("a shipped map")
         .expect("a sound map");

@@ -311,10 +311,10 @@ mod tests {
             .map(|file| std::fs::read_to_string(data.join(file)).unwrap())
             .concat();
         assert_eq!(provenance(|_| ()).map_sha256, sha256(files.as_bytes()));
-        let lotv = provenance(|config| {
-            config.env.set("units", "lotv").unwrap();
+        let liberty = provenance(|config| {
+            config.env.set("units", "liberty").unwrap();
         });
-        assert_ne!(lotv.map_sha256, provenance(|_| ()).map_sha256);
+        assert_ne!(liberty.map_sha256, provenance(|_| ()).map_sha256);
         let game = provenance(|config| *config = Config::with(&["env.name=matrix-game"]).unwrap());
         let payoffs = "1 0 0 0.4 0\n0 0.2 0.4 0.8 0.4\n0 0 0 0.4 0\n0 0 0 0.2 0\n0 0 0 0 0\n\
                        0 0 0.2 0 1\n0 0 0.4 0 0\n0.2 0.4 0.8 0.4 0.2\n0 0 0.4 0 0\n0 0 0.2 0 0\n";

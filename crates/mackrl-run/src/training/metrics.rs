@@ -213,6 +213,8 @@ mod tests {
             "test_dead_allies_mean",
             "dead_enemies_mean",
             "test_dead_enemies_mean",
+            "timed_out_mean",
+            "test_timed_out_mean",
         ];
         assert_eq!(names, expected);
         assert_eq!(headline(&spec), "test_battle_won_mean");

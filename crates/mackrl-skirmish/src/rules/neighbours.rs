@@ -1,6 +1,7 @@
 //! Who is near whom, so that movement does not look at all pairs in every loop.
 //!
-//! For each unit a list of those that could come close within the next loops, in ascending order. Lists are renewed when
+//! For each unit a list of those that a walker could take notice of within the next loops, in ascending order, and a shorter one of
+//! those of higher indices that it could touch. Lists are renewed when
 //! somebody has moved far enough that they could miss one. They hold more than is near, never less, so that what movement
 //! computes does not depend on when they were renewed: a battle that is restored from its state goes on to the same bits.
 
@@ -24,14 +25,21 @@ enum Plane {
     High,
 }
 
-/// Lists of near units, one behind the other.
+/// For each unit a list of others, one behind the other.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Neighbours {
+struct Lists {
     list: Vec<u8>,
     /// Where each unit's list begins; one more than units.
     begin: Vec<u16>,
-    /// Where the part of each unit's list begins that holds higher indices.
-    middle: Vec<u16>,
+}
+
+/// Lists of near units.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Neighbours {
+    /// Those that a walker takes notice of.
+    noticed: Lists,
+    /// Those of higher indices that touch.
+    touching: Lists,
     listed_x: Vec<f32>,
     listed_y: Vec<f32>,
     radius: Vec<f32>,
@@ -43,9 +51,8 @@ pub(super) struct Neighbours {
 
 impl Neighbours {
     pub(super) fn reserve(&mut self, units: usize) {
-        self.list.resize(units * units, 0);
-        make_room(&mut self.begin, units + 1);
-        make_room(&mut self.middle, units);
+        self.noticed.reserve(units);
+        self.touching.reserve(units);
         self.listed_x.resize(units, 0.0);
         self.listed_y.resize(units, 0.0);
         self.radius.resize(units, 0.0);
@@ -54,14 +61,14 @@ impl Neighbours {
         self.is_valid = false;
     }
 
-    /// Units near `index`, ascending.
+    /// Units that `index` could take notice of, ascending.
     pub(super) fn of(&self, index: usize) -> &[u8] {
-        &self.list[usize::from(self.begin[index])..usize::from(self.begin[index + 1])]
+        self.noticed.of(index)
     }
 
-    /// Units near `index` with higher indices, ascending.
+    /// Units with higher indices that could touch `index`, ascending.
     pub(super) fn after(&self, index: usize) -> &[u8] {
-        &self.list[usize::from(self.middle[index])..usize::from(self.begin[index + 1])]
+        self.touching.of(index)
     }
 
     /// Distance between centres at which two units touch.
@@ -102,29 +109,39 @@ impl Neighbours {
             };
             self.is_enemy[index] = unit.team == crate::rules::Team::Enemy;
         }
-        self.begin.clear();
-        self.middle.clear();
-        let mut end = 0;
-        for index in 0..state.units.len() {
-            self.begin.push(short(end));
-            end = self.list_range(index, 0..index, end);
-            self.middle.push(short(end));
-            end = self.list_range(index, index + 1..state.units.len(), end);
-        }
-        self.begin.push(short(end));
+        let (mut noticed, mut touching) = (
+            std::mem::take(&mut self.noticed),
+            std::mem::take(&mut self.touching),
+        );
+        let units = state.units.len();
+        noticed.renew(units, |list, index, end| {
+            let end = self.list_range(list, index, 0..index, LOOKAHEAD, end);
+            self.list_range(list, index, index + 1..units, LOOKAHEAD, end)
+        });
+        touching.renew(units, |list, index, end| {
+            self.list_range(list, index, index + 1..units, 0.0, end)
+        });
+        (self.noticed, self.touching) = (noticed, touching);
     }
 
-    /// Lists those of `range` that are near `index` from place `end` on; returns where their list ends.
+    /// Lists those of `range` that `gap` separates from `index` at most, in `list` from place `end` on; returns where they end.
     ///
     /// Everybody is written, and the place moves on only past those who are near: a branch that cannot be foreseen would cost
     /// more than the writing.
-    fn list_range(&mut self, index: usize, range: std::ops::Range<usize>, mut end: usize) -> usize {
+    fn list_range(
+        &self,
+        list: &mut [u8],
+        index: usize,
+        range: std::ops::Range<usize>,
+        gap: f32,
+        mut end: usize,
+    ) -> usize {
         let plane = self.plane[index];
         if plane == Plane::Gone || range.is_empty() {
             return end;
         }
         let (x, y) = (self.listed_x[index], self.listed_y[index]);
-        let reach = self.radius[index] + LOOKAHEAD + SKIN;
+        let reach = self.radius[index] + gap + SKIN;
         let others = self.listed_x[range.clone()]
             .iter()
             .zip(&self.listed_y[range.clone()])
@@ -134,10 +151,32 @@ impl Neighbours {
             let (dx, dy) = (other_x - x, other_y - y);
             let near = reach + radius;
             let is_listed = (dx * dx + dy * dy < near * near) & (*other_plane == plane);
-            self.list[end] = u8::try_from(other).expect("a battle has ≤ 256 units");
+            list[end] = u8::try_from(other).expect("a battle has ≤ 256 units");
             end += usize::from(is_listed);
         }
         end
+    }
+}
+
+impl Lists {
+    fn reserve(&mut self, units: usize) {
+        self.list.resize(units * units, 0);
+        make_room(&mut self.begin, units + 1);
+    }
+
+    fn of(&self, index: usize) -> &[u8] {
+        &self.list[usize::from(self.begin[index])..usize::from(self.begin[index + 1])]
+    }
+
+    /// Lists anew: `fill` writes the list of a unit from a place on and returns where it ends.
+    fn renew(&mut self, units: usize, fill: impl Fn(&mut [u8], usize, usize) -> usize) {
+        self.begin.clear();
+        let mut end = 0;
+        for index in 0..units {
+            self.begin.push(short(end));
+            end = fill(&mut self.list, index, end);
+        }
+        self.begin.push(short(end));
     }
 }
 

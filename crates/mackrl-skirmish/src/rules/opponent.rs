@@ -38,6 +38,9 @@ impl Battle {
     /// Lets those who have just looked and found nobody help friends near them that fight. That comes after everybody's own
     /// choice, so that the order of units in the arrays is of no consequence.
     fn support_friends(&mut self) {
+        if self.state.units.iter().all(|unit| unit.quarry.is_none()) {
+            return;
+        }
         for index in 0..self.state.units.len() {
             let unit = &self.state.units[index];
             let has_just_looked = unit.rescan == RESCAN_LOOPS && unit.swing.is_none();
@@ -115,12 +118,13 @@ impl Battle {
         let team = self.state.units[index].team;
         let mut nearest = Nearest::default();
         for (friend, unit) in self.state.units.iter().enumerate() {
+            if self.state.distance_squared(index, friend) > SUPPORT_RADIUS * SUPPORT_RADIUS {
+                continue;
+            }
             let Some(quarry) = unit.quarry.map(usize::from) else {
                 continue;
             };
-            let is_near = unit.team == team
-                && unit.is_alive()
-                && self.state.distance_squared(index, friend) <= SUPPORT_RADIUS * SUPPORT_RADIUS;
+            let is_near = unit.team == team && unit.is_alive();
             // What a healer has chosen is a friend.
             let is_enemy = self.state.units[quarry].team != team;
             if is_near && is_enemy && self.can_attack(index, quarry) {
@@ -140,11 +144,12 @@ impl Battle {
         let (x, y) = (self.state.x[index], self.state.y[index]);
         let mut nearest = Nearest::default();
         for (other, candidate) in self.state.units.iter().enumerate() {
-            if candidate.team == unit.team || !candidate.is_alive() {
-                continue;
-            }
             let (dx, dy) = (self.state.x[other] - x, self.state.y[other] - y);
             let square = dx * dx + dy * dy;
+            let is_farther = square >= nearest.square + NEARNESS_TOLERANCE;
+            if is_farther || candidate.team == unit.team || !candidate.is_alive() {
+                continue;
+            }
             let kind = usize::from(candidate.kind);
             let scan =
                 own.scan_range + NOTICE_MARGIN + own.radius + self.field.profiles[kind].radius;

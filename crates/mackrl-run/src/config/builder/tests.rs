@@ -277,6 +277,9 @@ fn what_version_0_1_0_recorded_is_read_as_it_was_meant() {
             .unwrap()
             .map("--map", map)
             .set(&format!("algorithm.name={algorithm}"))
+            .unwrap()
+            // The default of that time.
+            .set("env.units=liberty")
             .unwrap();
         assert_eq!(recorded(map, algorithm), expected.build().unwrap());
     }
