@@ -311,21 +311,34 @@ fn served_runs_are_drawn_with_their_replays() {
     BufReader::new(stdout)
         .read_line(&mut address)
         .expect("it says where it is");
-    let dom = browse(folder.path(), address.trim(), 1280);
-    let replay = format!("{}runs/0/replays/seed1-episode0.replay.gz", address.trim());
+    let address = address.trim();
+    for width in [1280, 400] {
+        let dom = browse(folder.path(), address, width);
+        assert!(dom.contains("finished, "), "its status: {dom}");
+        let plots = dom.matches("<section class=\"plot\">").count();
+        let charts = dom.matches("class=\"uplot").count();
+        assert!(
+            plots >= 6 && charts == plots,
+            "{plots} plots, {charts} charts"
+        );
+        for heading in ["Greedy tests", "Training", "Controllers"] {
+            let title = format!("<h2>{heading}</h2>");
+            assert!(dom.contains(&title), "the group {heading}: {dom}");
+        }
+        for controllers in ["pair_selector", "pair_controller", "agent_controller"] {
+            let title = format!("<h3>mackrl/entropy_{controllers}</h3>");
+            assert!(dom.contains(&title), "the entropy of {controllers}: {dom}");
+        }
+        assert!(!dom.contains("does not answer"), "{dom}");
+    }
+    let dom = browse(folder.path(), address, 1280);
+    let link = dom
+        .split("href=\"")
+        .filter_map(|rest| rest.split('"').next())
+        .find(|link| link.ends_with("replays/seed1-episode0.replay.gz"));
+    let replay = format!("{address}{}", link.expect("a link to its replay"));
     let page = browse(folder.path(), &replay, 1280);
     server.kill().and_then(|()| server.wait()).expect("it ends");
-    assert!(dom.contains("finished, "), "its status: {dom}");
-    assert!(
-        dom.contains("href=\"/runs/0/replays/seed1-episode0.replay.gz\""),
-        "its replay: {dom}"
-    );
-    let plots = dom.matches("<section class=\"plot\">").count();
-    assert!(plots >= 6, "{plots} plots");
-    for controllers in ["pair selector", "pair controller", "agent controller"] {
-        let title = format!("<h2>Entropy: {controllers} (nats)</h2>");
-        assert!(dom.contains(&title), "the entropy of {controllers}: {dom}");
-    }
     assert!(
         page.contains("<h1 id=\"title\">3m by mackrl, greedy</h1>"),
         "the replay's page"

@@ -6,8 +6,9 @@ use clap::Args;
 
 /// Show runs in the browser, on this machine alone, updating as they go
 ///
-/// Prints the address. The page draws win rate, return, delegation, entropies and speed of all runs, and links the newest replays.
-/// Only 127.0.0.1 is listened on, and run folders are only read. Ctrl-C ends it.
+/// Prints the address, with a token without which nothing is given out. The page draws all metrics, seeds of one setting as mean
+/// and band, lists the settings that differ, and links replays. Runs are found at any depth, and those that `mackrl reproduce`
+/// recorded as well. Only 127.0.0.1 is listened on, and run folders are only read. Ctrl-C ends it.
 ///
 /// Example: mackrl serve runs
 #[derive(Debug, Args)]
