@@ -18,9 +18,24 @@ pub(crate) enum Failure {
     /// Flags that do not go together.
     #[error("{message}")]
     Usage { message: String },
+    /// A result that could not be printed; it is lost, and nothing else.
+    #[error("cannot write to stdout")]
+    Stdout(#[source] io::Error),
     /// Data that cannot be used.
     #[error("{message}")]
     BadData { message: String },
+    /// Runs of a sweep that the operating system kept from going on.
+    #[error("{message}")]
+    RunsWithoutSystem { message: String },
+    /// Runs of a sweep that were stopped from outside.
+    #[error("{message}")]
+    RunsStopped { message: String },
+    /// A run that another process is making at the moment.
+    #[error("another process is writing in {folder}")]
+    MadeElsewhere {
+        /// Where.
+        folder: String,
+    },
     /// Two things that were compared are not the same.
     #[error("they differ, first in {first}")]
     Different {
@@ -43,8 +58,16 @@ pub(crate) enum Failure {
         problems: usize,
     },
     /// A team that does not run decentralised.
-    #[error("not decentralised: {mismatches} actions differ from the central run")]
+    #[error("not decentralised: {mismatches} comparisons with the central run failed")]
     CertificateFailed { mismatches: u64 },
+    /// An agent that was ended because it tried to reach something beyond what it is told.
+    #[error(
+        "not decentralised: agent {agent} tried to reach a file, the network or another process, and was ended by the system"
+    )]
+    ReachedOut {
+        /// Its number.
+        agent: usize,
+    },
     /// Quantities in which the simulator is not the game.
     #[error("the simulator differs from the real game in {failed} of {rows} quantities")]
     Unfaithful {
@@ -104,8 +127,11 @@ pub(crate) fn report(outcome: anyhow::Result<()>) -> ExitCode {
 /// The chain of causes on one line, and the remedy on another if one is known.
 fn explain(error: &anyhow::Error) -> String {
     let mut text = format!("error: {}\n", printable(&format!("{error:#}")));
-    if let Some(hint) = error.chain().find_map(|cause| verdict(cause).1) {
-        text.push_str(&format!("hint: {hint}\n"));
+    let is_of_stdout =
+        |cause: &(dyn StdError + 'static)| matches!(cause.downcast_ref(), Some(Failure::Stdout(_)));
+    let mut causes = error.chain().take_while(|cause| !is_of_stdout(*cause));
+    if let Some(hint) = causes.find_map(|cause| verdict(cause).1) {
+        text.push_str(&format!("hint: {}\n", printable(&hint)));
     }
     text
 }
@@ -144,7 +170,7 @@ fn verdict(cause: &(dyn StdError + 'static)) -> Verdict {
     } else if let Some(error) = cause.downcast_ref::<io::Error>() {
         use ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
         let is_full = matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge);
-        let hint = "make room; a run that was being trained goes on with `mackrl resume DIR`";
+        let hint = "make room, and give the command again; a run that has begun goes on with `mackrl resume DIR`";
         (Some(Exit::InputOutput), is_full.then(|| hint.to_owned()))
     } else {
         (None, None)
@@ -155,8 +181,19 @@ fn of_failure(failure: &Failure) -> Verdict {
     let (exit, hint) = match failure {
         Failure::Usage { .. } => (Exit::Usage, None),
         Failure::BadData { .. } => (Exit::Data, None),
+        Failure::Stdout(_) => (Exit::InputOutput, None),
+        Failure::RunsWithoutSystem { .. } => (
+            Exit::InputOutput,
+            Some("go on with the same command when that is mended".to_owned()),
+        ),
+        Failure::RunsStopped { .. } => (
+            Exit::Interrupted,
+            Some("go on with the same command".to_owned()),
+        ),
+        Failure::MadeElsewhere { .. } => (Exit::Interrupted, None),
         Failure::Different { .. }
         | Failure::CertificateFailed { .. }
+        | Failure::ReachedOut { .. }
         | Failure::Unfaithful { .. } => (Exit::Differs, None),
         Failure::OtherVersions { .. } => (
             Exit::Usage,
@@ -180,6 +217,7 @@ fn of_run(error: &RunError) -> Verdict {
     let (exit, hint) = match error {
         RunError::Config(error) => return verdict(&**error),
         RunError::Learning(error) => return of_library(error),
+        RunError::Within { source, .. } => return of_run(source),
         RunError::FolderInUse { .. } => (
             Exit::Usage,
             Some("choose another folder with --out, or move this one away".to_owned()),
@@ -235,6 +273,12 @@ fn of_run(error: &RunError) -> Verdict {
             )),
         ),
         RunError::BadData { .. } => (Exit::Data, None),
+        RunError::FolderReplaced { .. } => (
+            Exit::InputOutput,
+            Some(
+                "nothing was written into what lies there now; where the run's own folder still exists, `mackrl resume` goes on with it".to_owned(),
+            ),
+        ),
         // What caused these says more.
         _ => return (None, None),
     };
@@ -301,7 +345,14 @@ mod tests {
         let config = Config::with(&["a=1"]).unwrap_err();
         let missing = io::Error::from(ErrorKind::NotFound);
         let folder = PathBuf::from("x");
-        let cases: [(anyhow::Error, Exit); 8] = [
+        let damaged = RunError::Within {
+            what: "cannot use x".to_owned(),
+            source: Box::new(RunError::BadData {
+                message: "x is damaged".to_owned(),
+            }),
+        };
+        let cases: [(anyhow::Error, Exit); 9] = [
+            (damaged.into(), Exit::Data),
             (config.clone().into(), Exit::Configuration),
             (mackrl::Error::from(config).into(), Exit::Configuration),
             (mackrl::Error::Data(String::new()).into(), Exit::Data),

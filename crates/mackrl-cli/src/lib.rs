@@ -8,11 +8,13 @@
 mod args;
 mod commands;
 mod failure;
+mod isolation;
 mod output;
 mod plot;
 mod progress;
 mod replay;
 mod reproduce;
+#[cfg(feature = "serve")]
 mod serve;
 mod signals;
 
@@ -59,7 +61,7 @@ pub fn run(registry: Registry) -> ExitCode {
         Command::Resume(args) => commands::resume::run(&args),
         Command::Evaluate(args) => commands::evaluate::run(&args),
         Command::Certify(args) => commands::certify::run(&args),
-        Command::ExecuteAgent(args) => commands::execute_agent::run(&args),
+        Command::ExecuteAgent => commands::execute_agent::run(),
         Command::Sweep(args) => commands::sweep::run(&args),
         Command::Plot(args) => commands::plot::run(&args),
         Command::Report(args) => commands::report::run(&args),

@@ -9,13 +9,16 @@ use anyhow::Context;
 use mackrl_run::provenance::Provenance;
 use serde::Serialize;
 
-/// Writes `text` to stdout.
+use crate::failure::Failure;
+
+/// Writes `text` to stdout. Names of files and folders may stand in it, and anything may stand in them: what controls a terminal
+/// is left out.
 pub(crate) fn print(text: &str) -> anyhow::Result<()> {
     let mut stdout = io::stdout().lock();
-    stdout
-        .write_all(text.as_bytes())
-        .and_then(|()| stdout.flush())
-        .context("cannot write to stdout")
+    let shown = text.replace(|c: char| c.is_control() && !matches!(c, '\n' | '\t'), " ");
+    let written = stdout.write_all(shown.as_bytes());
+    let flushed = written.and_then(|()| stdout.flush());
+    Ok(flushed.map_err(Failure::Stdout)?)
 }
 
 /// Writes `value` to stdout as indented JSON.
@@ -35,15 +38,6 @@ pub(crate) struct Sourced<T> {
     pub(crate) provenance: Provenance,
     #[serde(flatten)]
     pub(crate) result: T,
-}
-
-/// How an episode ended, in words.
-pub(crate) const fn outcome(battle_won: bool, timed_out: bool) -> &'static str {
-    match (battle_won, timed_out) {
-        (true, _) => "won",
-        (false, true) => "out of time",
-        (false, false) => "not won",
-    }
 }
 
 /// Lays out rows of cells in columns: the first to the left, the others to the right. The first row is the heading.
@@ -69,6 +63,21 @@ pub(crate) fn table(rows: &[Vec<String>]) -> String {
         cells.join("  ").trim_end().to_owned() + "\n"
     };
     rows.iter().map(line).collect()
+}
+
+/// Text that stays text wherever it stands in a page.
+pub(crate) fn escaped(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for character in text.chars() {
+        match character {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            other => escaped.push(other),
+        }
+    }
+    escaped
 }
 
 #[cfg(test)]

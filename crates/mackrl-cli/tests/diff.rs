@@ -123,6 +123,9 @@ fn another_version_and_changed_records_are_told_apart() {
     let row: Value = serde_json::from_str(row).expect("a JSON object");
     let loss = format!("\"pg_loss\":{}", row["pg_loss"]);
     edit(&other, "metrics.jsonl", &loss, "\"pg_loss\":0.5");
+    let refused = exits(mackrl(&["diff", &one, &other]), 65);
+    assert!(refused.contains("is not what run.json says"), "{refused}");
+    edit(&other, "run.json", "\"finished\"", "\"running\"");
     let found = diff(&one, &other, 1);
     assert_eq!(found["metrics"]["row"], 2);
     assert_eq!(found["metrics"]["name"], "pg_loss");

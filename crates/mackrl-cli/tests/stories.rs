@@ -312,7 +312,7 @@ fn every_measurement_says_what_it_measured() {
 #[test]
 fn measuring_nothing_is_a_usage_error() {
     insta::assert_snapshot!(type_in("bench update --rows 0").fails(2), @r"
-    error: invalid value '0' for '--rows <B>': number would be zero for non-zero type
+    error: invalid value '0' for '--rows <B>': expected 1 to 10000
 
     For more information, try '--help'.
     ");

@@ -56,7 +56,7 @@ impl RandomPlay {
         for (agent, action) in self.actions.iter_mut().enumerate() {
             let view = self.observations.local_view(0, AgentId::new(agent));
             let uniform = key.uniform(self.steps, Draw::Agent(agent));
-            *action = nth_available(view.available(), uniform);
+            *action = random_action(view.available(), uniform);
         }
         let mut row = self.observations.row_mut(0);
         let time_step = self.environment.step(&self.actions, &mut row)?;
@@ -92,7 +92,11 @@ impl fmt::Debug for RandomPlay {
 }
 
 /// The available action at `uniform`, in [0, 1), of the way through all that are available; the first of all if none is.
-fn nth_available(available_a: &[bool], uniform: f64) -> Action {
+///
+/// # Shapes
+/// `available_a` \[A\].
+#[must_use]
+pub fn random_action(available_a: &[bool], uniform: f64) -> Action {
     let count = available_a.iter().filter(|&&available| available).count();
     let mut left = uniform * count as f64;
     let is_chosen = |available: &bool| {
@@ -111,7 +115,7 @@ mod tests {
     fn only_available_actions_are_chosen_and_all_of_them() {
         let available_a = [false, true, false, true, true];
         let chosen = [0.0, 0.34, 0.67, 1.0 - f64::EPSILON]
-            .map(|uniform| nth_available(&available_a, uniform).index());
+            .map(|uniform| random_action(&available_a, uniform).index());
         assert_eq!(chosen, [1, 3, 4, 4]);
     }
 

@@ -1,14 +1,20 @@
 //! Reading files that may be anything: folders, devices, pipes that nobody writes into, files of many gigabytes.
 //!
-//! Only regular files are opened, because opening a pipe waits for a writer, who may never come.
+//! Only regular files are read, because a pipe may never have a writer. These are files that a person named, so links are followed;
+//! what lies in a run folder is read through [`Folder`](crate::folder::Folder), which follows none.
 
 use std::{
     fs::{self, File, FileType},
-    io::{self, Read},
+    io,
     path::Path,
 };
 
-use crate::error::{Context, Result, RunError};
+use cap_std::{ambient_authority, fs::OpenOptions};
+
+use crate::{
+    error::{Context, Result, RunError},
+    folder::read_bounded,
+};
 
 /// The content of a file of at most `length_max` bytes.
 ///
@@ -17,24 +23,31 @@ use crate::error::{Context, Result, RunError};
 /// more.
 pub fn read(path: &Path, length_max: usize) -> Result<Vec<u8>> {
     let cannot = || format!("cannot read {}", path.display());
-    let kind = fs::metadata(path).with_context(cannot)?.file_type();
-    if !kind.is_file() {
+    let expect_file = |kind: FileType| {
+        if kind.is_file() {
+            return Ok(());
+        }
         let message = format!("it is {}, expected a file", in_words(kind));
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, message)).with_context(cannot);
+        Err(io::Error::new(io::ErrorKind::InvalidInput, message)).with_context(cannot)
+    };
+    // Opening some devices does something; a pipe that takes a file's place after this look is opened without waiting.
+    expect_file(fs::metadata(path).with_context(cannot)?.file_type())?;
+    let file = open_without_waiting(path).with_context(cannot)?;
+    expect_file(file.metadata().with_context(cannot)?.file_type())?;
+    read_bounded(file, path, length_max)
+}
+
+/// Opens a file; where a pipe stands, its other end is not waited for.
+fn open_without_waiting(path: &Path) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.read(true);
+    #[cfg(unix)]
+    {
+        use cap_fs_ext::OpenOptionsSyncExt;
+        options.nonblock(true);
     }
-    let file = File::open(path).with_context(cannot)?;
-    let mut bytes = Vec::new();
-    file.take(length_max as u64 + 1)
-        .read_to_end(&mut bytes)
-        .with_context(cannot)?;
-    if bytes.len() > length_max {
-        let message = format!(
-            "{} is too long, expected at most {length_max} bytes",
-            path.display()
-        );
-        return Err(RunError::BadData { message });
-    }
-    Ok(bytes)
+    let file = cap_std::fs::File::open_ambient_with(path, &options, ambient_authority())?;
+    Ok(file.into_std())
 }
 
 /// The text of a file of at most `length_max` bytes.

@@ -36,6 +36,12 @@ pub enum RunError {
         /// The folder.
         folder: PathBuf,
     },
+    /// A folder that was moved or removed while a run was being made in it.
+    #[error("{} was moved or removed while the run was being made", folder.display())]
+    FolderReplaced {
+        /// Where it lay.
+        folder: PathBuf,
+    },
     /// A folder in which no run lies.
     #[error("{} is not a run folder: it has no config.toml", folder.display())]
     NotARun {
@@ -138,6 +144,16 @@ impl From<ConfigError> for RunError {
     }
 }
 
+/// That there can be no further thread.
+impl From<io::Error> for RunError {
+    fn from(source: io::Error) -> Self {
+        Self::System {
+            what: "cannot start a thread".to_owned(),
+            source,
+        }
+    }
+}
+
 impl RunError {
     /// The error and what caused it, on one line.
     #[must_use]
@@ -149,6 +165,15 @@ impl RunError {
             cause = error.source();
         }
         text
+    }
+
+    /// The error itself, without what it kept from being done.
+    #[must_use]
+    pub fn root(&self) -> &Self {
+        match self {
+            Self::Within { source, .. } => source.root(),
+            error => error,
+        }
     }
 
     /// Whether this is [`RunError::Interrupted`].

@@ -3,8 +3,10 @@
 //! The crate [`mackrl`] holds the paper and writes no file. This one brings worlds, policies and learners together
 //! ([`training`]) as a configuration ([`config`]) describes them, and records episodes that can be played again ([`replay`]).
 
+mod apart;
 pub mod bounded;
 pub mod config;
+pub mod folder;
 pub mod provenance;
 pub mod recorded;
 pub mod replay;

@@ -55,7 +55,7 @@ fn the_same_versions_train_the_same_weights() {
         })
         .collect();
     let found = json!({
-        "of": "mackrl train --preset paper-code --map MAP --algorithm ALGORITHM --steps 3000 --seed 1: sha256sum weights.safetensors",
+        "of": "mackrl train --preset paper-code --map MAP --algorithm ALGORITHM --steps 3000 --seed 1: SHA-256 of weights.safetensors without its __metadata__",
         "simulator": SIMULATOR_VERSION,
         "learning": LEARNING_VERSION,
         "runs": runs,

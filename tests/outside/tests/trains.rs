@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use mackrl::decentralised::{AgentLink, InProcessAgent, Subject};
+use mackrl::decentralised::{AgentLink, InProcessAgent, Isolation, Repetition, Subject};
 use mackrl_env::AgentId;
 use mackrl_run::{
     config::{Config, ConfigBuilder, Registry},
@@ -79,6 +79,8 @@ fn its_agents_alone_do_what_the_central_run_does() {
         policy: algorithm.policy(),
         parameters: algorithm.parameters(),
         environment: &mut *environment,
+        repetition: Repetition::Exact,
+        isolation: Isolation::None,
         links: &mut links,
         seed: 1,
         sampled: algorithm.behaviour(0),

@@ -4,7 +4,7 @@ use std::num::{NonZeroU64, NonZeroUsize};
 
 use clap::{Args, Subcommand};
 
-use crate::args::{ConfigurationArgs, runs::ThreadsArgs};
+use crate::args::{ConfigurationArgs, count_to, runs::ThreadsArgs};
 
 /// Measure how fast this machine is
 ///
@@ -43,7 +43,7 @@ pub(crate) struct BenchEnvironmentArgs {
     pub(crate) steps: NonZeroU64,
 
     /// Threads, each with an environment of its own
-    #[arg(long, value_name = "K", default_value = "1")]
+    #[arg(long, value_name = "K", default_value = "1", value_parser = count_to(1024))]
     pub(crate) threads: NonZeroUsize,
 
     /// Print a JSON object instead of a table
@@ -60,15 +60,15 @@ pub(crate) struct BenchEnvironmentArgs {
 #[derive(Debug, Args)]
 pub(crate) struct BenchUpdateArgs {
     /// Rows of the batch: pairs times environments
-    #[arg(long, value_name = "B", default_value = "80")]
+    #[arg(long, value_name = "B", default_value = "80", value_parser = count_to(10_000))]
     pub(crate) rows: NonZeroUsize,
 
     /// Steps of the episodes
-    #[arg(long, value_name = "T", default_value = "60")]
+    #[arg(long, value_name = "T", default_value = "60", value_parser = count_to(10_000))]
     pub(crate) steps: NonZeroUsize,
 
     /// Updates to time
-    #[arg(long, value_name = "N", default_value = "100")]
+    #[arg(long, value_name = "N", default_value = "100", value_parser = count_to(1_000_000))]
     pub(crate) updates: NonZeroUsize,
 
     /// Print a JSON object instead of a table

@@ -4,7 +4,7 @@ use std::{num::NonZeroUsize, path::PathBuf};
 
 use clap::Args;
 
-use crate::args::runs::ThreadsArgs;
+use crate::args::{EPISODES_MOST, count_to, runs::ThreadsArgs};
 
 /// Compare the simulator with recorded runs of the real StarCraft II, quantity by quantity
 ///
@@ -35,7 +35,7 @@ pub(crate) struct FidelityArgs {
     pub(crate) map: Option<String>,
 
     /// Episodes of each policy on each map
-    #[arg(long, value_name = "N", default_value = "1000")]
+    #[arg(long, value_name = "N", default_value = "1000", value_parser = count_to(EPISODES_MOST))]
     pub(crate) episodes: NonZeroUsize,
 
     #[command(flatten)]

@@ -16,7 +16,7 @@ mod sc2;
 mod serve;
 mod sweep;
 
-use std::{path::PathBuf, sync::LazyLock};
+use std::{num::NonZeroUsize, path::PathBuf, sync::LazyLock};
 
 use clap::{Args, Parser, Subcommand};
 use mackrl::nn::InstructionSet;
@@ -35,7 +35,7 @@ pub(crate) use fidelity::FidelityArgs;
 pub(crate) use inquiry::DiffArgs;
 pub(crate) use play::PlayArgs;
 pub(crate) use replay::{ExplainArgs, ReplayArgs};
-pub(crate) use runs::{CertifyArgs, EvaluateArgs, ExecuteAgentArgs, ResumeArgs, TrainArgs};
+pub(crate) use runs::{CertifyArgs, EvaluateArgs, ResumeArgs, TrainArgs};
 pub(crate) use sc2::Sc2Args;
 #[cfg(all(feature = "sc2", target_os = "linux"))]
 pub(crate) use sc2::{
@@ -60,6 +60,19 @@ pub(crate) struct Cli {
     pub(crate) command: Command,
 }
 
+/// Most episodes that can be asked for: years of them.
+const EPISODES_MOST: usize = 1_000_000_000;
+
+/// Reads a count from 1 to `most`, of what takes memory or time for each.
+fn count_to(most: usize) -> impl Fn(&str) -> Result<NonZeroUsize, String> + Clone + Send + Sync {
+    move |text| {
+        let count = text.parse::<NonZeroUsize>().ok();
+        count
+            .filter(|count| count.get() <= most)
+            .ok_or_else(|| format!("expected 1 to {most}"))
+    }
+}
+
 /// What `--version` tells: the version, and the instructions that this machine computes with.
 fn long_version() -> &'static str {
     static TEXT: LazyLock<String> = LazyLock::new(|| {
@@ -75,8 +88,11 @@ pub(crate) enum Command {
     Resume(ResumeArgs),
     Evaluate(EvaluateArgs),
     Certify(CertifyArgs),
+    /// Live as one agent of a trained team: learn from stdin who it is, read local views, and write actions to stdout
+    ///
+    /// `mackrl certify` starts one such process per agent.
     #[command(hide = true)]
-    ExecuteAgent(ExecuteAgentArgs),
+    ExecuteAgent,
     Sweep(SweepArgs),
     Plot(PlotArgs),
     Report(ReportArgs),

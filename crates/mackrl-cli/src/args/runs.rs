@@ -4,7 +4,7 @@ use std::{num::NonZeroUsize, path::PathBuf};
 
 use clap::Args;
 
-use crate::args::ConfigurationArgs;
+use crate::args::{ConfigurationArgs, EPISODES_MOST, count_to};
 
 /// Train a team, and write its weights, metrics and configuration into a run folder
 ///
@@ -69,7 +69,7 @@ pub(crate) struct EvaluateArgs {
     pub(crate) run: PathBuf,
 
     /// Episodes to play
-    #[arg(long, value_name = "N", default_value = "320")]
+    #[arg(long, value_name = "N", default_value = "320", value_parser = count_to(EPISODES_MOST))]
     pub(crate) episodes: NonZeroUsize,
 
     /// Seed of the episodes [default: the run's own]
@@ -90,12 +90,14 @@ pub(crate) struct EvaluateArgs {
 
 /// Prove that a trained team runs decentralised
 ///
-/// Starts one process per agent, gives each only its own local views, its number, the weights and the seed, and compares
-/// every action, and every number that a controller reads, with the central run: sampled and greedy, for whole episodes. Then
-/// repeats the central run in worlds in which everything that an agent does not see is replaced by noise, and demands that
-/// its actions stay the same. Exit code 1 and the first counter-example if anything differs.
+/// Starts one process per agent, gives each only its own local views, its number, the weights and the key of its choices, and
+/// compares every action, every input of a controller and every log-probability with the central run, bit for bit: sampled and
+/// greedy, for whole episodes. On Linux the system ends a process that tries to reach anything else. Then repeats the
+/// central run in worlds in which everything that an agent does not see is replaced by noise, alters the world's state beyond
+/// its sight, and draws from another key; what is computed for the agent has to stay the same. Says in a sentence what was
+/// proved, and what was not. Exit code 1 and the first counter-example if anything differs.
 ///
-/// Example: mackrl certify runs/3m-mackrl-ppo-seed1 --episodes 100 --json
+/// Example: mackrl certify runs/3m-mackrl-ppo-seed1 --episodes 100 --html certificate.html
 #[derive(Debug, Args)]
 pub(crate) struct CertifyArgs {
     /// Run folder that `mackrl train` wrote
@@ -103,34 +105,20 @@ pub(crate) struct CertifyArgs {
     pub(crate) run: PathBuf,
 
     /// Episodes to compare in each mode, sampled and greedy
-    #[arg(long, value_name = "N", default_value = "100")]
+    #[arg(long, value_name = "N", default_value = "100", value_parser = count_to(EPISODES_MOST))]
     pub(crate) episodes: NonZeroUsize,
 
     /// Seed of the episodes [default: the run's own]
     #[arg(long, value_name = "S")]
     pub(crate) seed: Option<u64>,
 
+    /// Write the certificate into this file too, as one page
+    #[arg(long, value_name = "FILE")]
+    pub(crate) html: Option<PathBuf>,
+
     /// Print a JSON object instead of a table
     #[arg(long)]
     pub(crate) json: bool,
-}
-
-/// Live as one agent of a trained team: read local views from stdin, write actions to stdout, one JSON object a line
-///
-/// `mackrl certify` starts one such process per agent.
-#[derive(Debug, Args)]
-pub(crate) struct ExecuteAgentArgs {
-    /// Run folder that `mackrl train` wrote
-    #[arg(value_name = "DIR")]
-    pub(crate) run: PathBuf,
-
-    /// Number of the agent, from 0
-    #[arg(long, value_name = "I")]
-    pub(crate) agent: usize,
-
-    /// Weights of the team [default: those of the run]
-    #[arg(long, value_name = "FILE")]
-    pub(crate) weights: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

@@ -11,7 +11,7 @@ use mackrl_env::{EpisodeKey, Stream};
 use mackrl_run::{
     provenance::{Choice, Judgement, Provenance},
     replay::record_policy,
-    run_folder::Run,
+    run_folder::{self, REPLAYS, Run},
     training::{Episodes, Evaluation, evaluate_in},
 };
 use serde_json::Value;
@@ -19,7 +19,7 @@ use serde_json::Value;
 use crate::{
     args::EvaluateArgs,
     commands::sc2,
-    failure::Failure,
+    failure::{Failure, printable},
     output::{self, Sourced},
     progress::Meter,
 };
@@ -65,23 +65,20 @@ fn save_replays(folder: &Path, run: &Run, seed: u64, count: usize) -> anyhow::Re
     if count == 0 {
         return Ok(());
     }
-    let replays = folder.join("replays");
-    std::fs::create_dir_all(&replays)
-        .with_context(|| format!("cannot create {}", replays.display()))?;
     let meter = Meter::new("replays");
     for episode in 0..count {
         let key = EpisodeKey::new(seed, Stream::Evaluation, episode as u64);
         let replay = record_policy(&run.config, &run.weights, Behaviour::GREEDY, key)
             .with_context(|| format!("cannot make a replay of {}", folder.display()))?;
-        let file = replays.join(format!("seed{seed}-episode{episode}.replay.gz"));
-        output::write_file(&file, &replay.to_bytes())?;
+        let name = format!("seed{seed}-episode{episode}.replay.gz");
+        run_folder::keep_replay(folder, &name, &replay.to_bytes())?;
         meter.report(episode + 1, count);
     }
     // The replays are there, whether anybody reads this or not.
     let _ = writeln!(
         io::stderr(),
         "{count} replays are in {}: see `mackrl replay FILE --html OUT`",
-        replays.display()
+        printable(&folder.join(REPLAYS).display().to_string())
     );
     Ok(())
 }

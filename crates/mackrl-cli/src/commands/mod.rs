@@ -2,6 +2,8 @@
 
 use mackrl_run::recorded::Grouping;
 
+use crate::failure::printable;
+
 pub(crate) mod bench;
 pub(crate) mod certify;
 pub(crate) mod config;
@@ -26,9 +28,23 @@ pub(crate) mod serve;
 pub(crate) mod sweep;
 pub(crate) mod train;
 
-use std::io::{self, Write};
+use std::{
+    io::{self, Write},
+    path::PathBuf,
+};
 
-/// Says that runs were left out, if some were.
+/// Where this program lies, to start it once more. Where the system does not tell, as without `/proc`, it is found again by the
+/// name by which it was called.
+fn this_program() -> anyhow::Result<PathBuf> {
+    let called = || std::env::args_os().next().map(PathBuf::from);
+    match std::env::current_exe() {
+        Ok(program) => Ok(program),
+        Err(error) => called()
+            .ok_or_else(|| anyhow::Error::new(error).context("cannot find this program's file")),
+    }
+}
+
+/// Says that runs were left out, or that rows of a run are missing, if some are.
 fn note_left_out(grouping: &Grouping) {
     if grouping.left_out > 0 {
         // The result is the same whether anybody reads this or not.
@@ -36,6 +52,14 @@ fn note_left_out(grouping: &Grouping) {
             io::stderr(),
             "note: {} runs are not finished and left out; --unfinished uses them as far as they have come",
             grouping.left_out
+        );
+    }
+    let runs = grouping.series.iter().flat_map(|series| &series.runs);
+    for run in runs.filter(|run| run.misses_rows) {
+        let _ = writeln!(
+            io::stderr(),
+            "warning: {}: metrics were damaged and put aside when the run continued; rows before that are missing",
+            printable(&run.path.display().to_string())
         );
     }
 }

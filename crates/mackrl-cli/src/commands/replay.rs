@@ -4,7 +4,7 @@ use crate::{
     args::ReplayArgs,
     failure::Failure,
     output,
-    replay::{Opened, Summary, page, picture},
+    replay::{Opened, picture},
 };
 
 /// Plays a replay again, writes what was asked for, and says how the episode went.
@@ -21,14 +21,14 @@ pub(crate) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     let group = opened.group(&args.group)?;
     if let Some(file) = &args.html {
         let step = opened.check_step(args.step.unwrap_or(0))?;
-        output::write_file(file, page(&opened, step)?.as_bytes())?;
+        output::write_file(file, opened.page(step).as_bytes())?;
     }
     let step = opened.check_step(args.step.unwrap_or(opened.playback.steps() / 2))?;
     if let Some(file) = &args.svg {
         let picture = picture(&opened, step, &group);
         output::write_file(file, picture.to_svg().as_bytes())?;
     }
-    let summary = Summary::of(&opened);
+    let summary = opened.summary();
     if args.json {
         output::print_json(&summary)
     } else {

@@ -7,7 +7,6 @@ use std::{
     process::Command,
 };
 
-use anyhow::Context;
 use mackrl_run::{
     RunError,
     stop_request::StopRequest,
@@ -18,7 +17,8 @@ use mackrl_run::{
 use super::train::print;
 use crate::{
     args::ResumeArgs,
-    commands::sc2,
+    commands::{sc2, this_program},
+    failure::{Failure, printable},
     progress::{RunProgress, SweepProgress},
     signals,
 };
@@ -29,7 +29,12 @@ pub(crate) fn run(args: &ResumeArgs) -> anyhow::Result<()> {
     if args.leashed {
         signals::stop_when_stdin_ends(&stop);
     }
-    match go_on(&args.run, args.threads.count(), &stop)? {
+    let gone_on = go_on(&args.run, args.threads.count(), &stop);
+    let gone_on = match gone_on {
+        Err(error) if args.leashed => return Err(or_made_elsewhere(error)),
+        gone_on => gone_on?,
+    };
+    match gone_on {
         Some(summary) => print(&summary, args.json),
         None => Ok(()),
     }
@@ -45,10 +50,21 @@ pub(super) fn go_on(
     let summary = training_loop::resume(path, sc2::world, threads, stop, &mut progress)?;
     if summary.is_none() {
         // Nothing is wrong: starting runs again until they are finished is one way to make them.
-        let folder = path.display();
+        let folder = printable(&path.display().to_string());
         let _ = writeln!(io::stderr(), "{folder} is finished: nothing is left to do");
     }
     Ok(summary)
+}
+
+/// The error of one run of many; that another process makes it is none.
+pub(super) fn or_made_elsewhere(error: RunError) -> anyhow::Error {
+    match error {
+        RunError::FolderLocked { folder } => Failure::MadeElsewhere {
+            folder: folder.display().to_string(),
+        }
+        .into(),
+        error => error.into(),
+    }
 }
 
 /// Makes all runs that are not finished, `jobs` at a time, each in a process that resumes it, and shows how they stand.
@@ -57,7 +73,7 @@ pub(crate) fn make_all(
     jobs: NonZeroUsize,
     stop: &StopRequest,
 ) -> anyhow::Result<Outcome> {
-    let program = std::env::current_exe().context("cannot find this program's file")?;
+    let program = this_program()?;
     let process = |folder: &Path| {
         let mut command = Command::new(&program);
         command

@@ -92,7 +92,8 @@ fn one(plan: &Plan, index: usize, args: &SweepArgs, stop: &StopRequest) -> anyho
     // Refuses a folder with another run, before anything is written.
     entry.state()?;
     entry.prepare()?;
-    match resume::go_on(&entry.folder, args.threads.count(), stop)? {
+    let gone_on = resume::go_on(&entry.folder, args.threads.count(), stop);
+    match gone_on.map_err(resume::or_made_elsewhere)? {
         Some(summary) => train::print(&summary, args.json),
         None if args.json => output::print_json(&Listed::of((index, entry))?),
         None => Ok(()),
@@ -101,24 +102,43 @@ fn one(plan: &Plan, index: usize, args: &SweepArgs, stop: &StopRequest) -> anyho
 
 /// Makes all runs, each in a process of its own.
 fn all(plan: &Plan, args: &SweepArgs, stop: &StopRequest) -> anyhow::Result<()> {
-    let Outcome { finished, failed } = make_all(&plan.entries, args.jobs(), stop)?;
-    let runs = plan.entries.len();
-    if !failed.is_empty() {
-        let reasons: Vec<String> = (failed.iter())
-            .map(|(name, reason)| format!("{name}: {reason}"))
-            .collect();
-        let message = format!(
-            "{} of {runs} runs failed: {}",
-            failed.len(),
-            reasons.join("; ")
-        );
-        return Err(Failure::BadData { message }.into());
-    }
+    let outcome = make_all(&plan.entries, args.jobs(), stop)?;
+    expect_all(&outcome, plan.entries.len())?;
     if args.json {
         return list(plan, true);
     }
     output::print(&format!(
-        "{}: {finished} of {runs} runs are finished\n",
-        plan.out.display()
+        "{}: {} of {} runs are finished\n",
+        plan.out.display(),
+        outcome.finished,
+        plan.entries.len()
     ))
+}
+
+/// Refuses an outcome in which some of all `runs` did not reach their end, with the reasons.
+pub(crate) fn expect_all(outcome: &Outcome, runs: usize) -> anyhow::Result<()> {
+    let told = |named: &[(String, String)]| -> String {
+        let reasons = named
+            .iter()
+            .map(|(name, reason)| format!("{name}: {reason}"));
+        reasons.collect::<Vec<_>>().join("; ")
+    };
+    let Outcome {
+        failed, stopped, ..
+    } = outcome;
+    if !failed.is_empty() {
+        let reasons = told(failed);
+        let message = format!("{} of {runs} runs failed: {reasons}", failed.len());
+        return Err(if outcome.failed_by_system == failed.len() {
+            Failure::RunsWithoutSystem { message }.into()
+        } else {
+            Failure::BadData { message }.into()
+        });
+    }
+    if !stopped.is_empty() {
+        let reasons = told(stopped);
+        let message = format!("{} of {runs} runs were stopped: {reasons}", stopped.len());
+        return Err(Failure::RunsStopped { message }.into());
+    }
+    Ok(())
 }

@@ -18,7 +18,7 @@ mod scene;
 mod svg;
 mod text;
 
-pub(crate) use battle::{BattlePicture, Figure, Lens, Link, Shot, Side};
+pub(crate) use battle::{BattlePicture, Figure, Lens, Link, Side};
 pub(crate) use chart::{Axis, Colour, Corner, LineChart, Mark, Point, Series};
 pub(crate) use multiples::{Multiple, SmallMultiples};
 

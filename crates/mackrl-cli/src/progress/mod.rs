@@ -11,6 +11,8 @@ use std::{
 
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 
+use crate::failure::printable;
+
 pub(crate) use meter::Meter;
 pub(crate) use run::RunProgress;
 pub(crate) use sweep::SweepProgress;
@@ -103,7 +105,7 @@ fn bar() -> ProgressBar {
 
 /// Writes a line to stderr. A run must not end because stderr cannot be written.
 fn write(text: &str) {
-    let _ = writeln!(io::stderr(), "{text}");
+    let _ = writeln!(io::stderr(), "{}", printable(text));
 }
 
 /// Rate, and the time that the rest takes: ", 25000/s, 0:30 left"; nothing without a rate.

@@ -1,23 +1,19 @@
 //! Looking into replays: how they are opened, told, drawn and shown.
 
 mod explanation;
-mod page;
 mod picture;
-mod summary;
 
 use std::path::Path;
 
 use mackrl_env::AgentId;
 use mackrl_run::{
     bounded,
-    replay::{Names, Playback, Replay, ReplayError},
+    replay::{self, Names, Playback, Replay, ReplayError, Summary},
 };
 
 use crate::failure::Failure;
 pub(crate) use explanation::Explanation;
-pub(crate) use page::page;
 pub(crate) use picture::picture;
-pub(crate) use summary::Summary;
 
 /// A replay that was opened and played again.
 #[derive(Debug)]
@@ -38,6 +34,15 @@ impl Opened {
         Self::of(Replay::from_bytes(&bytes).map_err(failed)?).map_err(|error| failed(error).into())
     }
 
+    /// Reads and plays the content of a file.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    #[cfg(feature = "serve")]
+    pub(crate) fn from_bytes(bytes: &[u8]) -> anyhow::Result<Self> {
+        Ok(Self::of(Replay::from_bytes(bytes)?)?)
+    }
+
     /// Plays a replay.
     pub(crate) fn of(replay: Replay) -> Result<Self, ReplayError> {
         let playback = replay.play()?;
@@ -46,6 +51,16 @@ impl Opened {
             replay,
             playback,
         })
+    }
+
+    /// How the episode went.
+    pub(crate) fn summary(&self) -> Summary {
+        Summary::of(&self.replay, &self.playback)
+    }
+
+    /// The page for the browser, which first shows `step`.
+    pub(crate) fn page(&self, step: usize) -> String {
+        replay::page(&self.replay, &self.playback, step)
     }
 
     /// `step`, if the episode is so long.

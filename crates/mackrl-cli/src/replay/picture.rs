@@ -2,14 +2,14 @@
 
 use mackrl::policy::GroupChoice;
 use mackrl_env::{AgentId, EntityId, EntitySet, Environment};
-use mackrl_run::replay::Moment;
+use mackrl_run::replay::{Moment, shot};
 use mackrl_skirmish::{
-    rules::{BattleState, Order, Team},
+    rules::{BattleState, Team},
     terrain::MAP_SIZE,
 };
 
 use super::Opened;
-use crate::plot::{BattlePicture, Figure, Lens, Link, Shot, Side};
+use crate::plot::{BattlePicture, Figure, Lens, Link, Side};
 
 /// Agents outside the group whose fields of view are drawn too; more would hide the battle.
 const OTHERS_SHOWN: usize = 3;
@@ -77,23 +77,6 @@ fn figure(opened: &Opened, state: &BattleState, before: &BattleState, index: usi
         life: f64::from(unit.life / profile.life),
         shield: (profile.shield > 0.0).then(|| f64::from(unit.shield / profile.shield)),
     }
-}
-
-/// Whom a living unit is aiming at or healing, and whether it has attacked since `before`: then its weapon reloads for longer than it
-/// did.
-pub(super) fn shot(state: &BattleState, before: &BattleState, index: usize) -> Option<Shot> {
-    let unit = &state.units[index];
-    let target = match unit.order {
-        Order::Attack { target } | Order::Heal { target } => Some(target),
-        Order::Stop | Order::Move { .. } | Order::AttackMove { .. } | Order::Hunt => unit.quarry,
-    };
-    let target = usize::from(target?);
-    let is_shown = unit.is_alive() && before.units[target].is_alive();
-    is_shown.then(|| Shot {
-        from: index,
-        to: target,
-        has_fired: unit.cooldown > before.units[index].cooldown,
-    })
 }
 
 /// The pairs of living agents that the partition chosen at this step contains.

@@ -1,10 +1,6 @@
 //! The curves of a run, read from its metrics.
 
-use std::{
-    collections::{BTreeMap, BTreeSet},
-    fs::File,
-    io::{BufRead, BufReader, Read},
-};
+use std::collections::BTreeSet;
 
 use mackrl::statistics::mean;
 use serde_json::Value;
@@ -12,12 +8,10 @@ use serde_json::Value;
 use super::RecordedRun;
 use crate::{
     config::nearest,
-    error::{Context, Result, RunError},
-    run_folder,
+    error::{Result, RunError},
+    run_folder::{METRICS, Row, StoredRun},
 };
 
-/// Longest row of metrics that is read.
-const ROW_LENGTH_MAX: u64 = 1 << 20;
 /// Share of the tests at the end of a run whose mean is the run's score.
 const FINAL_SHARE: f64 = 0.1;
 
@@ -53,27 +47,10 @@ impl Measurements {
                 RunError::MissingMetric { message }
             });
         }
-        let path = run.path.join(run_folder::METRICS);
-        let name = path.display();
-        let file = File::open(&path).with_context(|| format!("cannot read {name}"))?;
-        let mut reader = BufReader::new(file);
         let mut reading = Reading::default();
-        for number in 1.. {
-            let mut line = Vec::new();
-            (&mut reader)
-                .take(ROW_LENGTH_MAX)
-                .read_until(b'\n', &mut line)
-                .with_context(|| format!("cannot read {name}"))?;
-            // A row without its end is still being written.
-            if line.last() != Some(&b'\n') {
-                break;
-            }
-            let row: BTreeMap<String, Value> =
-                serde_json::from_slice(&line).map_err(|error| RunError::BadData {
-                    message: format!("{name}: row {number} is not a JSON object: {error}"),
-                })?;
-            reading.note(row, metric);
-        }
+        StoredRun::open(&run.path)?.rows(|row| reading.note(row, metric))?;
+        let path = run.path.join(METRICS);
+        let name = path.display();
         let Reading { found, seen, .. } = reading;
         if found.values.is_empty() {
             let suggestion = nearest(metric, seen.iter().map(String::as_str));
@@ -106,7 +83,7 @@ struct Reading {
 }
 
 impl Reading {
-    fn note(&mut self, row: BTreeMap<String, Value>, metric: &str) {
+    fn note(&mut self, row: Row, metric: &str) {
         let number = |name: &str| row.get(name).and_then(Value::as_f64);
         let steps = number("t_env").unwrap_or(self.steps);
         if let Some(rate) = number("sys/sps").filter(|rate| *rate > 0.0) {
@@ -118,7 +95,7 @@ impl Reading {
             self.found.wall_s.push(self.wall_s);
             self.found.values.push(value);
         }
-        self.seen.extend(row.into_keys());
+        self.seen.extend(row.into_iter().map(|(name, _)| name));
     }
 }
 

@@ -23,6 +23,25 @@ const RUNS_MAX: usize = 10_000;
 /// # Errors
 /// If there is none at one of the paths, or one cannot be read.
 pub fn find(paths: &[PathBuf]) -> Result<Vec<RecordedRun>> {
+    locate(paths)?.into_iter().map(open).collect()
+}
+
+/// Reads the run at a path that [`locate`] gave: a run folder, or a file that is kept of a run.
+///
+/// # Errors
+/// If it cannot be read.
+pub fn open(path: PathBuf) -> Result<RecordedRun> {
+    match is_kept(&path) {
+        true => RecordedRun::open_kept(path),
+        false => RecordedRun::open(path),
+    }
+}
+
+/// Where the runs in or below `paths` lie, in the order of their names, each once; none of them is read.
+///
+/// # Errors
+/// If there is none at one of the paths, or one cannot be read.
+pub fn locate(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let mut found = BTreeSet::new();
     for path in paths {
         let before = found.len();
@@ -38,11 +57,7 @@ pub fn find(paths: &[PathBuf]) -> Result<Vec<RecordedRun>> {
         debug_assert!(found.len() >= before, "nothing is forgotten");
     }
     // Ordered by where they really are, so that a run that is named twice counts once; shown as they were named.
-    let open = |(real, shown): (PathBuf, PathBuf)| match is_kept(&real) {
-        true => RecordedRun::open_kept(shown),
-        false => RecordedRun::open(shown),
-    };
-    found.into_iter().map(open).collect()
+    Ok(found.into_iter().map(|(_, shown)| shown).collect())
 }
 
 /// Whether a file is named as those that are kept of runs.
@@ -97,7 +112,9 @@ fn collect(
 /// The names of the files in a folder that are named as those that are kept of runs.
 fn kept_files(folder: &Path) -> Vec<OsString> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let kept = entries.filter(|entry| is_kept(&entry.path()));
+    // A link that was found, and not named, could lead to anything.
+    let is_plain = |entry: &fs::DirEntry| entry.file_type().is_ok_and(|kind| kind.is_file());
+    let kept = entries.filter(|entry| is_plain(entry) && is_kept(&entry.path()));
     let mut names: Vec<OsString> = kept.map(|entry| entry.file_name()).collect();
     names.sort();
     names

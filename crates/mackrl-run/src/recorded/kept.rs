@@ -79,6 +79,11 @@ impl TrainingRun {
         let stored: Stored =
             serde_json::from_slice(&bytes).map_err(|error| bad(error.to_string()))?;
         let config = config(&stored.config).map_err(|error| bad(error.to_string()))?;
+        let rates = stored.delegation.iter().flatten().flatten();
+        let mut shares = stored.battle_won.iter().chain(rates);
+        if let Some(share) = shares.find(|share| !(0.0..=1.0).contains(*share)) {
+            return Err(bad(format!("a share is {share}, expected 0 to 1")));
+        }
         Ok(Self {
             provenance: (stored.provenance).unwrap_or_else(|| Provenance::of_unknown_code(&config)),
             config: stored.config,

@@ -21,7 +21,7 @@ use crate::{
     training::headline,
 };
 pub use curve::{Axis, Measurements, final_mean, share_of};
-pub use find::find;
+pub use find::{find, locate, open};
 pub use grid::Gridded;
 pub use kept::TrainingRun;
 pub use series::{Grouping, Selection, Series, group};
@@ -44,6 +44,8 @@ pub struct RecordedRun {
     pub status: Status,
     /// Where its results come from: one entry for each version of the program that went on with it.
     pub provenance: Vec<Provenance>,
+    /// Whether rows of its metrics are missing, because they were found damaged when the run continued.
+    pub misses_rows: bool,
 }
 
 impl RecordedRun {
@@ -60,6 +62,7 @@ impl RecordedRun {
             kept: None,
             status: description.status,
             provenance: description.provenance,
+            misses_rows: !description.metrics_put_aside.is_empty(),
         })
     }
 
@@ -73,6 +76,7 @@ impl RecordedRun {
             config: run.config()?,
             status: Status::Finished,
             provenance: vec![run.provenance().clone()],
+            misses_rows: false,
             kept: Some(run),
             path,
         })

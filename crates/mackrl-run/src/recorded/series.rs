@@ -262,6 +262,7 @@ mod tests {
     fn run(settings: &[&str]) -> RecordedRun {
         let config = Config::with(settings).unwrap();
         RecordedRun {
+            misses_rows: false,
             path: PathBuf::from(settings.join(" ")),
             provenance: vec![Provenance::of_run(&config)],
             config,

@@ -12,8 +12,11 @@
 mod file;
 mod knowledge;
 mod names;
+mod page;
 mod playback;
 mod recording;
+mod shots;
+mod summary;
 
 use mackrl_env::{Action, EpisodeKey};
 use mackrl_skirmish::scripted::ScriptedPolicy;
@@ -23,8 +26,11 @@ use thiserror::Error;
 pub use self::{
     knowledge::{GroupKnowledge, PrivateKnowledge},
     names::Names,
+    page::page,
     playback::{Moment, Playback},
     recording::{record_policy, record_script},
+    shots::{Shot, shot},
+    summary::{Summary, outcome_in_words},
 };
 use mackrl::policy::{Behaviour, Thought};
 

@@ -11,20 +11,18 @@
 //! is whole, whenever the program or the machine stopped. Two checkpoints of one number are equal to the byte, because a run
 //! is a function of its configuration.
 
-use std::{
-    fs, io,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use super::{
     CHECKPOINTS, CONFIG, METRICS,
-    disk::{self, Disk, cannot},
+    disk::{self, Disk},
     manifest::{FORMAT, Fingerprint, Growing, Manifest},
+    stored::ConfigFile,
     untrusted,
 };
 use crate::{
-    bounded,
     error::{Context, Result, RunError},
+    folder::{Folder, Kind},
     provenance::CODE,
     training::Checkpoint,
 };
@@ -49,55 +47,58 @@ pub(super) struct Surroundings {
 pub(super) struct Stored {
     pub(super) number: u64,
     pub(super) checkpoint: Checkpoint,
-    /// The metrics that belong to it.
-    pub(super) metrics: Growing,
+    /// The metrics that belong to it; nothing, if they were damaged, lost or replaced.
+    pub(super) metrics: Option<Growing>,
 }
 
-/// Writes the checkpoint with this number, unless it is there, and removes all but the latest `kept`.
+/// Writes the checkpoint with this number, unless it is there, and removes all but the latest `kept` up to it.
 ///
 /// # Errors
 /// Path, bytes and what the operating system says; earlier checkpoints are intact then.
 pub(super) fn write(
     disk: &dyn Disk,
-    run: &Path,
+    run: &Folder,
     (number, checkpoint): (u64, &Checkpoint),
     surroundings: Surroundings,
     kept: usize,
 ) -> Result<()> {
-    let place = place(run, number);
-    if !place.exists() {
-        create_parent(disk, &place)?;
-        make(disk, &place, &contents(checkpoint), surroundings)?;
+    let place = place(number);
+    if run.kind(&place)?.is_none() {
+        create_parent(disk, run)?;
+        make(disk, run, &place, &contents(checkpoint), surroundings)?;
     }
-    let numbers = numbers(run)?;
+    let mut numbers = numbers(run)?;
+    numbers.retain(|&other| other <= number);
     for &old in &numbers[..numbers.len().saturating_sub(kept)] {
         remove(disk, run, old)?;
     }
     Ok(())
 }
 
-/// Makes the folder that `place` is to lie in, unless it is there.
-pub(super) fn create_parent(disk: &dyn Disk, place: &Path) -> Result<()> {
-    let parent = parent(place);
-    if parent.exists() {
+/// Makes the folder of the checkpoints, unless it is there.
+fn create_parent(disk: &dyn Disk, run: &Folder) -> Result<()> {
+    let parent = Path::new(CHECKPOINTS);
+    if run.kind(parent)?.is_some() {
         return Ok(());
     }
-    disk.create_folder(&parent)
-        .with_context(|| cannot("create", &parent))?;
-    disk::sync_folder(disk, &self::parent(&parent))
+    disk.create_folder(run, parent)
+        .with_context(|| run.cannot("create", parent))?;
+    disk::sync_folder(disk, run, Path::new(""))
 }
 
 /// The files of a checkpoint.
-pub(super) fn contents(checkpoint: &Checkpoint) -> [(&'static str, &[u8]); 2] {
+fn contents(checkpoint: &Checkpoint) -> [(&'static str, &[u8]); 2] {
     [
         (TENSORS, &checkpoint.tensors),
         (COUNTERS, &checkpoint.counters),
     ]
 }
 
-/// Makes a folder of these files and their manifest.
-pub(super) fn make(
+/// Makes a folder of these files and their manifest; what could not be completed is removed again, since a full disk needs the
+/// room.
+fn make(
     disk: &dyn Disk,
+    run: &Folder,
     place: &Path,
     contents: &[(&str, &[u8])],
     Surroundings { config, metrics }: Surroundings,
@@ -114,23 +115,30 @@ pub(super) fn make(
     };
     let manifest = serde_json::to_string_pretty(&manifest).expect("hashes can be written") + "\n";
     let temporary = disk::temporary(place);
-    disk.create_folder(&temporary)
-        .with_context(|| cannot("create", &temporary))?;
-    for (name, content) in contents {
-        disk::write_synced(disk, &temporary.join(name), content)?;
+    let complete = || {
+        disk.create_folder(run, &temporary)
+            .with_context(|| run.cannot("create", &temporary))?;
+        for (name, content) in contents {
+            disk::write_synced(disk, run, &temporary.join(name), content)?;
+        }
+        disk::write_synced(disk, run, &temporary.join(MANIFEST), manifest.as_bytes())?;
+        disk::sync_folder(disk, run, &temporary)?;
+        disk::rename(disk, run, &temporary, place)
+    };
+    if let Err(error) = complete() {
+        // The first error is the one to report; resuming removes what is left here.
+        let _ = disk.remove_folder(run, &temporary);
+        return Err(error);
     }
-    disk::write_synced(disk, &temporary.join(MANIFEST), manifest.as_bytes())?;
-    disk::sync_folder(disk, &temporary)?;
-    disk::rename(disk, &temporary, place)?;
-    disk::sync_folder(disk, &parent(place))
+    disk::sync_folder(disk, run, disk::parent(place))
 }
 
-fn remove(disk: &dyn Disk, run: &Path, number: u64) -> Result<()> {
-    let place = place(run, number);
+fn remove(disk: &dyn Disk, run: &Folder, number: u64) -> Result<()> {
+    let place = place(number);
     let temporary = disk::temporary(&place);
-    disk::rename(disk, &place, &temporary)?;
-    disk.remove_folder(&temporary)
-        .with_context(|| cannot("remove", &temporary))
+    disk::rename(disk, run, &place, &temporary)?;
+    disk.remove_folder(run, &temporary)
+        .with_context(|| run.cannot("remove", &temporary))
 }
 
 /// The latest checkpoint that is as it was written, if the run has checkpoints, and what is wrong with later ones. Its tensors
@@ -138,14 +146,18 @@ fn remove(disk: &dyn Disk, run: &Path, number: u64) -> Result<()> {
 ///
 /// # Errors
 /// [`RunError::BadData`] if there are checkpoints and none can be used.
-pub(super) fn latest(run: &Path, tensors_max: usize) -> Result<(Option<Stored>, Vec<String>)> {
+pub(super) fn latest(
+    run: &Folder,
+    config: &ConfigFile,
+    tensors_max: usize,
+) -> Result<(Option<Stored>, Vec<String>)> {
     let mut wrong = Vec::new();
     for number in numbers(run)?.into_iter().rev() {
-        match read(run, number, tensors_max) {
+        match read(run, config, number, tensors_max) {
             Ok(stored) => return Ok((Some(stored), wrong)),
             Err(error) => wrong.push(format!(
                 "{} is damaged: {}",
-                place(run, number).display(),
+                run.shown(place(number)).display(),
                 error.chain()
             )),
         }
@@ -158,100 +170,110 @@ pub(super) fn latest(run: &Path, tensors_max: usize) -> Result<(Option<Stored>, 
 }
 
 /// Removes what is not complete, and every checkpoint after the one with this number.
-pub(super) fn tidy(disk: &dyn Disk, run: &Path, latest: Option<u64>) -> Result<()> {
+pub(super) fn tidy(disk: &dyn Disk, run: &Folder, latest: Option<u64>) -> Result<()> {
     for number in numbers(run)? {
         if latest.is_some_and(|latest| number > latest) {
             remove(disk, run, number)?;
         }
     }
-    for name in names(run)? {
-        let path = run.join(CHECKPOINTS).join(name);
-        if path.extension().is_some_and(|end| end == disk::TEMPORARY) {
-            disk.remove_folder(&path)
-                .with_context(|| cannot("remove", &path))?;
+    for (name, kind) in run.entries(CHECKPOINTS)? {
+        let path = Path::new(CHECKPOINTS).join(name);
+        let is_temporary = path.extension().is_some_and(|end| end == disk::TEMPORARY);
+        if is_temporary && kind == Kind::Folder {
+            disk.remove_folder(run, &path)
+                .with_context(|| run.cannot("remove", &path))?;
         }
     }
     Ok(())
 }
 
-/// Where the weights of a checkpoint lie.
-pub(super) fn weights_path(run: &Path, number: u64) -> PathBuf {
-    place(run, number).join(TENSORS)
+/// Where the weights of a checkpoint lie in the folder of the run.
+pub(super) fn weights_path(number: u64) -> PathBuf {
+    place(number).join(TENSORS)
 }
 
-/// Reads a checkpoint, and compares everything with its manifest.
-fn read(run: &Path, number: u64, tensors_max: usize) -> Result<Stored> {
-    let folder = place(run, number);
-    let manifest = bounded::read(&folder.join(MANIFEST), untrusted::TEXT_MAX)?;
-    let manifest: Manifest =
-        serde_json::from_slice(&manifest).map_err(|error| RunError::BadData {
-            message: format!("{}: {error}", cannot("understand", &folder.join(MANIFEST))),
-        })?;
-    if manifest.format != FORMAT {
-        let message = format!(
-            "{} has format {}, expected {FORMAT}",
-            folder.join(MANIFEST).display(),
-            manifest.format
-        );
-        return Err(RunError::BadData { message });
+/// Reads a checkpoint, and compares everything with its manifest. The configuration decides what a checkpoint means; the metrics
+/// only stand beside it, so damage to them costs no checkpoint.
+fn read(run: &Folder, config: &ConfigFile, number: u64, tensors_max: usize) -> Result<Stored> {
+    let place = place(number);
+    let manifest = read_manifest(run, &place)?;
+    if !config.is(&manifest.config) {
+        return Err(differs(run, Path::new(CONFIG)));
     }
-    let differs = |path: &Path| RunError::BadData {
-        message: format!("{} is not what {MANIFEST} says", path.display()),
+    let metrics = match run.file(METRICS)? {
+        Some(file) => (manifest.metrics.begins(file))
+            .with_context(|| run.cannot("read", Path::new(METRICS)))?,
+        None => manifest.metrics.begins(&b""[..]).unwrap_or_default(),
     };
-    let own = |name: &str, length_max| {
-        let path = folder.join(name);
-        let content = bounded::read(&path, length_max)?;
-        let same = manifest.files.get(name) == Some(&Fingerprint::of(&content));
-        if same {
-            Ok(content)
-        } else {
-            Err(differs(&path))
-        }
-    };
-    let beginning = |name: &str, fingerprint: &Fingerprint| {
-        let path = run.join(name);
-        let file = fs::File::open(&path).with_context(|| cannot("read", &path))?;
-        let begins = fingerprint.begins(file);
-        let begins = begins.with_context(|| cannot("read", &path))?;
-        begins.ok_or_else(|| differs(&path))
-    };
-    beginning(CONFIG, &manifest.config)?;
     Ok(Stored {
         number,
-        checkpoint: Checkpoint {
-            tensors: own(TENSORS, tensors_max)?,
-            counters: own(COUNTERS, COUNTERS_MAX)?,
-        },
-        metrics: beginning(METRICS, &manifest.metrics)?,
+        checkpoint: read_files(run, &place, &manifest, tensors_max)?,
+        metrics,
     })
 }
 
-fn place(run: &Path, number: u64) -> PathBuf {
-    run.join(CHECKPOINTS).join(format!("{number:0DIGITS$}"))
+/// Reads the checkpoint in a folder whose run is not known.
+pub(super) fn read_alone(checkpoint: &Folder) -> Result<Checkpoint> {
+    let manifest = read_manifest(checkpoint, Path::new(""))?;
+    // What the file should hold bounds how much of it is read.
+    let expected = manifest.files.get(TENSORS).map_or(0, |file| file.bytes);
+    let tensors_max = usize::try_from(expected).unwrap_or(usize::MAX);
+    read_files(checkpoint, Path::new(""), &manifest, tensors_max)
 }
 
-fn parent(place: &Path) -> PathBuf {
-    place.parent().map_or_else(PathBuf::new, Path::to_owned)
+fn read_manifest(folder: &Folder, place: &Path) -> Result<Manifest> {
+    let place = place.join(MANIFEST);
+    let manifest = folder.read_needed(&place, untrusted::TEXT_MAX)?;
+    let manifest: Manifest =
+        serde_json::from_slice(&manifest).map_err(|error| RunError::BadData {
+            message: format!("{}: {error}", folder.cannot("understand", &place)),
+        })?;
+    if manifest.format == FORMAT {
+        return Ok(manifest);
+    }
+    let message = format!(
+        "{} has format {}, expected {FORMAT}",
+        folder.shown(place).display(),
+        manifest.format
+    );
+    Err(RunError::BadData { message })
+}
+
+fn read_files(
+    folder: &Folder,
+    place: &Path,
+    manifest: &Manifest,
+    tensors_max: usize,
+) -> Result<Checkpoint> {
+    let own = |name: &str, length_max| {
+        let path = place.join(name);
+        let content = folder.read_needed(&path, length_max)?;
+        match manifest.files.get(name) {
+            Some(file) if *file == Fingerprint::of(&content) => Ok(content),
+            _ => Err(differs(folder, &path)),
+        }
+    };
+    Ok(Checkpoint {
+        tensors: own(TENSORS, tensors_max)?,
+        counters: own(COUNTERS, COUNTERS_MAX)?,
+    })
+}
+
+fn differs(folder: &Folder, path: &Path) -> RunError {
+    let shown = folder.shown(path);
+    let message = format!("{} is not what {MANIFEST} says", shown.display());
+    RunError::BadData { message }
+}
+
+fn place(number: u64) -> PathBuf {
+    Path::new(CHECKPOINTS).join(format!("{number:0DIGITS$}"))
 }
 
 /// The numbers of all checkpoints, in order.
-fn numbers(run: &Path) -> Result<Vec<u64>> {
-    let names = names(run)?;
-    let whole = names.iter().filter(|name| name.len() == DIGITS);
-    let mut numbers: Vec<u64> = whole.filter_map(|name| name.parse().ok()).collect();
+fn numbers(run: &Folder) -> Result<Vec<u64>> {
+    let entries = run.entries(CHECKPOINTS)?;
+    let whole = entries.iter().filter(|(name, _)| name.len() == DIGITS);
+    let mut numbers: Vec<u64> = whole.filter_map(|(name, _)| name.parse().ok()).collect();
     numbers.sort_unstable();
     Ok(numbers)
-}
-
-/// What lies among the checkpoints.
-fn names(run: &Path) -> Result<Vec<String>> {
-    let folder = run.join(CHECKPOINTS);
-    let entries = match fs::read_dir(&folder) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
-        entries => entries.with_context(|| cannot("read", &folder))?,
-    };
-    entries
-        .map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()))
-        .collect::<io::Result<_>>()
-        .with_context(|| cannot("read", &folder))
 }

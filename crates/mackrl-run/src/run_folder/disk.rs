@@ -4,30 +4,35 @@
 
 use std::{
     fmt::Debug,
-    fs::{self, File},
+    fs::File,
     io::{self, Write},
     path::{Path, PathBuf},
 };
 
-use crate::error::{Context, Result};
+use cap_std::fs::OpenOptions;
 
-/// Ending of what is not complete yet, or not needed any more: whoever finds it may remove it.
+use crate::{
+    error::{Context, Result},
+    folder::Folder,
+};
+
+/// Ending of what is not complete yet, or not needed any more: it may be removed.
 pub(super) const TEMPORARY: &str = "tmp";
 
-/// What can be done to a disk.
+/// What can be done in a folder of a disk. Paths lead from that folder on.
 pub(super) trait Disk: Debug {
     /// Makes a folder whose parent exists.
-    fn create_folder(&self, path: &Path) -> io::Result<()>;
+    fn create_folder(&self, within: &Folder, path: &Path) -> io::Result<()>;
     /// Makes a file, or empties the one that is there.
-    fn create(&self, path: &Path) -> io::Result<File>;
+    fn create(&self, within: &Folder, path: &Path) -> io::Result<File>;
     /// Writes all of `content`.
     fn write(&self, file: &mut File, content: &[u8]) -> io::Result<()>;
     /// Waits until a file's content, or a folder's names, would survive a loss of power.
     fn sync(&self, file: &File) -> io::Result<()>;
     /// Gives a file or a folder another name, at once.
-    fn rename(&self, from: &Path, to: &Path) -> io::Result<()>;
+    fn rename(&self, within: &Folder, from: &Path, to: &Path) -> io::Result<()>;
     /// Removes a folder and what is in it.
-    fn remove_folder(&self, path: &Path) -> io::Result<()>;
+    fn remove_folder(&self, within: &Folder, path: &Path) -> io::Result<()>;
 }
 
 /// The disk of this machine.
@@ -35,12 +40,13 @@ pub(super) trait Disk: Debug {
 pub(super) struct RealDisk;
 
 impl Disk for RealDisk {
-    fn create_folder(&self, path: &Path) -> io::Result<()> {
-        fs::create_dir(path)
+    fn create_folder(&self, within: &Folder, path: &Path) -> io::Result<()> {
+        within.dir().create_dir(path)
     }
 
-    fn create(&self, path: &Path) -> io::Result<File> {
-        File::create(path)
+    fn create(&self, within: &Folder, path: &Path) -> io::Result<File> {
+        let mut options = OpenOptions::new();
+        within.open_with(path, options.write(true).create(true).truncate(true))
     }
 
     fn write(&self, file: &mut File, content: &[u8]) -> io::Result<()> {
@@ -51,12 +57,12 @@ impl Disk for RealDisk {
         file.sync_all()
     }
 
-    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
-        fs::rename(from, to)
+    fn rename(&self, within: &Folder, from: &Path, to: &Path) -> io::Result<()> {
+        within.dir().rename(from, within.dir(), to)
     }
 
-    fn remove_folder(&self, path: &Path) -> io::Result<()> {
-        fs::remove_dir_all(path)
+    fn remove_folder(&self, within: &Folder, path: &Path) -> io::Result<()> {
+        within.dir().remove_dir_all(path)
     }
 }
 
@@ -65,48 +71,60 @@ impl Disk for RealDisk {
 ///
 /// # Errors
 /// Path, bytes and what the operating system says; the file that was there is intact then.
-pub(super) fn replace(disk: &dyn Disk, path: &Path, content: &[u8]) -> Result<()> {
+pub(super) fn replace(disk: &dyn Disk, within: &Folder, path: &Path, content: &[u8]) -> Result<()> {
     let temporary = temporary(path);
-    let written = write_synced(disk, &temporary, content);
-    let renamed = written.and_then(|()| rename(disk, &temporary, path));
+    let written = write_synced(disk, within, &temporary, content);
+    let renamed = written.and_then(|()| rename(disk, within, &temporary, path));
     if renamed.is_err() {
-        // The first error is the one to report; a leftover temporary file harms nobody.
-        let _ = fs::remove_file(&temporary);
+        // The first error is the one to report; a temporary file that is left does no harm.
+        let _ = within.dir().remove_file(&temporary);
     }
     renamed?;
-    path.parent()
-        .map_or(Ok(()), |folder| sync_folder(disk, folder))
+    sync_folder(disk, within, parent(path))
 }
 
 /// Writes a file and waits until its content is safe. Its name is safe when its folder has been synced as well.
-pub(super) fn write_synced(disk: &dyn Disk, path: &Path, content: &[u8]) -> Result<()> {
+pub(super) fn write_synced(
+    disk: &dyn Disk,
+    within: &Folder,
+    path: &Path,
+    content: &[u8],
+) -> Result<()> {
     let write = || {
-        let mut file = disk.create(path)?;
+        let mut file = disk.create(within, path)?;
         disk.write(&mut file, content)?;
         disk.sync(&file)
     };
-    write().with_context(|| cannot_write(path, content.len()))
+    write().with_context(|| cannot_write(&within.shown(path), content.len()))
 }
 
 /// Gives a file or a folder another name.
-pub(super) fn rename(disk: &dyn Disk, from: &Path, to: &Path) -> Result<()> {
-    disk.rename(from, to)
-        .with_context(|| format!("{} to {}", cannot("rename", from), to.display()))
+pub(super) fn rename(disk: &dyn Disk, within: &Folder, from: &Path, to: &Path) -> Result<()> {
+    disk.rename(within, from, to).with_context(|| {
+        let to = within.shown(to);
+        format!("{} to {}", within.cannot("rename", from), to.display())
+    })
 }
 
 /// Makes the names in a folder safe; only Unix lets a folder be opened and synced.
-pub(super) fn sync_folder(disk: &dyn Disk, folder: &Path) -> Result<()> {
+pub(super) fn sync_folder(disk: &dyn Disk, within: &Folder, path: &Path) -> Result<()> {
     if !cfg!(unix) {
         return Ok(());
     }
-    // The parent of a relative path of one name has an empty name.
-    let folder = match folder {
-        empty if empty.as_os_str().is_empty() => Path::new("."),
-        named => named,
+    let path = if path.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        path
     };
-    File::open(folder)
+    within
+        .open_with(path, OpenOptions::new().read(true))
         .and_then(|file| disk.sync(&file))
-        .with_context(|| cannot("sync", folder))
+        .with_context(|| within.cannot("sync", path))
+}
+
+/// The folder that a path lies in.
+pub(super) fn parent(path: &Path) -> &Path {
+    path.parent().unwrap_or(Path::new(""))
 }
 
 /// The name under which something is written that shall become `path`.
@@ -117,38 +135,37 @@ pub(super) fn temporary(path: &Path) -> PathBuf {
     name.into()
 }
 
-/// "cannot VERB PATH"
-pub(super) fn cannot(verb: &str, path: &Path) -> String {
-    format!("cannot {verb} {}", path.display())
-}
-
 /// "cannot write PATH (N bytes)"
 pub(super) fn cannot_write(path: &Path, bytes: usize) -> String {
-    format!("{} ({bytes} bytes)", cannot("write", path))
+    format!("cannot write {} ({bytes} bytes)", path.display())
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]
     fn a_failed_replacement_leaves_the_old_content() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("weights");
-        replace(&RealDisk, &path, b"old").unwrap();
+        let parent = tempfile::tempdir().unwrap();
+        let folder = Folder::open(parent.path()).unwrap();
+        let path = Path::new("weights");
+        replace(&RealDisk, &folder, path, b"old").unwrap();
         // A folder in the way of the temporary file makes every write to it fail.
-        fs::create_dir(temporary(&path)).unwrap();
-        assert!(replace(&RealDisk, &path, b"new").is_err());
-        assert_eq!(fs::read(&path).unwrap(), b"old");
+        fs::create_dir(parent.path().join(temporary(path))).unwrap();
+        assert!(replace(&RealDisk, &folder, path, b"new").is_err());
+        assert_eq!(fs::read(parent.path().join(path)).unwrap(), b"old");
     }
 
     #[test]
     fn a_replacement_leaves_no_temporary_file() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("weights");
-        replace(&RealDisk, &path, b"old").unwrap();
-        replace(&RealDisk, &path, b"new").unwrap();
-        assert_eq!(fs::read(&path).unwrap(), b"new");
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        let parent = tempfile::tempdir().unwrap();
+        let folder = Folder::open(parent.path()).unwrap();
+        let path = Path::new("weights");
+        replace(&RealDisk, &folder, path, b"old").unwrap();
+        replace(&RealDisk, &folder, path, b"new").unwrap();
+        assert_eq!(fs::read(parent.path().join(path)).unwrap(), b"new");
+        assert_eq!(fs::read_dir(parent.path()).unwrap().count(), 1);
     }
 }

@@ -8,15 +8,23 @@
 //! earlier files say: what was computed again is shown once. Nothing here is ever read back.
 
 use std::{
-    fs::{File, OpenOptions},
+    fs::File,
+    io::ErrorKind,
     path::{Path, PathBuf},
     time::SystemTime,
 };
 
-use crate::error::{Context, Result, RunError};
+use cap_std::fs::OpenOptions;
 use serde_json::{Map, Value};
 
-use super::disk::{Disk, cannot, cannot_write};
+use super::disk::{Disk, cannot_write};
+use crate::{
+    error::{Context, Result, RunError},
+    folder::Folder,
+};
+
+/// Most event files of processes with one number in one second.
+const SUFFIXES: u32 = 10_000;
 
 /// Numbers of the fields of `Event`, `Summary`, `Summary.Value` and `SessionLog`, with their kinds of encoding.
 const WALL_TIME: u8 = 1 << 3 | FIXED_64;
@@ -49,19 +57,28 @@ impl EventFile {
     ///
     /// # Errors
     /// Path, bytes and what the operating system says.
-    pub(super) fn create(disk: &dyn Disk, run: &Path, steps_env: u64) -> Result<Self> {
+    pub(super) fn create(disk: &dyn Disk, run: &Folder, steps_env: u64) -> Result<Self> {
         let wall_s = wall_s();
-        let name = format!(
-            "events.out.tfevents.{wall_s:010.0}.mackrl.{}.0",
+        // A file of this name would be that of another process with this number in this second, as containers have them; a link
+        // could lead anywhere.
+        let mut options = OpenOptions::new();
+        options.create_new(true).append(true);
+        let stem = format!(
+            "events.out.tfevents.{wall_s:010.0}.mackrl.{}",
             std::process::id()
         );
-        let path = run.join(name);
-        // A file of this name would be that of another process; a link could lead anywhere.
-        let file = OpenOptions::new()
-            .create_new(true)
-            .append(true)
-            .open(&path)
-            .with_context(|| cannot("create", &path))?;
+        let mut attempt = 0;
+        let (name, file) = loop {
+            let name = format!("{stem}.{attempt}");
+            match run.open_with(Path::new(&name), &options) {
+                Err(error) if error.kind() == ErrorKind::AlreadyExists && attempt < SUFFIXES => {
+                    attempt += 1;
+                }
+                file => break (name, file),
+            }
+        };
+        let file = file.with_context(|| run.cannot("create", Path::new(&name)))?;
+        let path = run.shown(name);
         let mut events = Self { path, file };
         let opening = [
             record(&opening(wall_s)),

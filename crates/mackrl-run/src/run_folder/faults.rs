@@ -50,14 +50,14 @@ impl FaultyDisk {
 }
 
 impl Disk for FaultyDisk {
-    fn create_folder(&self, path: &Path) -> io::Result<()> {
+    fn create_folder(&self, within: &Folder, path: &Path) -> io::Result<()> {
         self.check()?;
-        RealDisk.create_folder(path)
+        RealDisk.create_folder(within, path)
     }
 
-    fn create(&self, path: &Path) -> io::Result<File> {
+    fn create(&self, within: &Folder, path: &Path) -> io::Result<File> {
         self.check()?;
-        RealDisk.create(path)
+        RealDisk.create(within, path)
     }
 
     /// A write that fails has written half.
@@ -75,14 +75,14 @@ impl Disk for FaultyDisk {
         self.check()
     }
 
-    fn rename(&self, from: &Path, to: &Path) -> io::Result<()> {
+    fn rename(&self, within: &Folder, from: &Path, to: &Path) -> io::Result<()> {
         self.check()?;
-        RealDisk.rename(from, to)
+        RealDisk.rename(within, from, to)
     }
 
-    fn remove_folder(&self, path: &Path) -> io::Result<()> {
+    fn remove_folder(&self, within: &Folder, path: &Path) -> io::Result<()> {
         self.check()?;
-        RealDisk.remove_folder(path)
+        RealDisk.remove_folder(within, path)
     }
 }
 
@@ -147,6 +147,9 @@ fn no_failing_operation_costs_a_checkpoint() {
                 };
                 cases += 1;
                 assert_is_told(&error, &path);
+                if duration == Duration::Once {
+                    assert_room_is_given_back(&path);
+                }
                 assert_continues(&path, &checkpoints);
             }
         }
@@ -164,6 +167,14 @@ fn assert_is_told(error: &RunError, path: &Path) {
         !message.contains("write") || message.contains(" bytes)"),
         "{message}"
     );
+}
+
+/// What could not be completed takes no room on a full disk, unless removing a checkpoint was what failed.
+fn assert_room_is_given_back(path: &Path) {
+    let entries = fs::read_dir(path.join(CHECKPOINTS)).unwrap();
+    let names: Vec<_> = entries.map(|entry| entry.unwrap().file_name()).collect();
+    let unfinished = names.iter().find(|name| *name == "000000000003.tmp");
+    assert_eq!(unfinished, None, "{names:?}");
 }
 
 /// The run stands at its second or at its third checkpoint, whole, and goes on to its end.

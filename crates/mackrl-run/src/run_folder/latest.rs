@@ -1,15 +1,17 @@
 //! How far a run has come, by what it last wrote down.
 
 use std::{
-    collections::BTreeMap,
-    fs::File,
     io::{Read, Seek, SeekFrom},
     path::Path,
 };
 
 use serde_json::Value;
 
-use super::METRICS;
+use super::{
+    METRICS,
+    rows::{Row, RowCheck},
+};
+use crate::folder::Folder;
 
 /// Bytes at the end of the metrics that are read: more than one row, and mostly with a test among them.
 const TAIL: u64 = 64 * 1024;
@@ -28,14 +30,14 @@ pub struct LatestRow {
 /// Reads the end of the metrics of the run at `path`; whatever cannot be read is not known.
 pub fn latest_row(path: &Path) -> LatestRow {
     let mut latest = LatestRow::default();
-    for line in tail(&path.join(METRICS))
-        .unwrap_or_default()
-        .split(|&byte| byte == b'\n')
-    {
+    for line in tail(path).unwrap_or_default().split(|&byte| byte == b'\n') {
         // The first line may be cut, and the last is perhaps still being written.
-        let Ok(row) = serde_json::from_slice::<BTreeMap<String, Value>>(line) else {
+        let Ok(row) = serde_json::from_slice::<Row>(line) else {
             continue;
         };
+        if RowCheck::default().check(&row).is_err() {
+            continue;
+        }
         let number = |name: &str| row.get(name).and_then(Value::as_f64);
         latest.steps_env = (row.get("t_env").and_then(Value::as_u64)).unwrap_or(latest.steps_env);
         latest.steps_per_s = number("sys/sps").or(latest.steps_per_s);
@@ -44,13 +46,14 @@ pub fn latest_row(path: &Path) -> LatestRow {
     latest
 }
 
-fn tail(path: &Path) -> std::io::Result<Vec<u8>> {
-    let mut file = File::open(path)?;
-    let length = file.metadata()?.len();
-    file.seek(SeekFrom::Start(length.saturating_sub(TAIL)))?;
+fn tail(run: &Path) -> Option<Vec<u8>> {
+    let mut file = Folder::open(run).ok()?.file(METRICS).ok()??;
+    let length = file.metadata().ok()?.len();
+    file.seek(SeekFrom::Start(length.saturating_sub(TAIL)))
+        .ok()?;
     let mut bytes = Vec::new();
-    file.take(TAIL).read_to_end(&mut bytes)?;
-    Ok(bytes)
+    file.take(TAIL).read_to_end(&mut bytes).ok()?;
+    Some(bytes)
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ pub(super) const FORMAT: u64 = 1;
 pub(super) struct Fingerprint {
     pub(super) bytes: u64,
     /// SHA-256 in hexadecimal, as `sha256sum` prints it.
-    sha256: String,
+    pub(super) sha256: String,
 }
 
 impl Fingerprint {

@@ -1,18 +1,9 @@
-//! What a run has recorded, for whoever compares it with another.
+//! What a run has recorded, to be compared with another.
 
-use std::{fs, io, path::Path};
+use std::path::Path;
 
-use serde_json::{Map, Value};
-
-use super::{METRICS, WEIGHTS, disk::cannot, read_record, run::read_config};
-use crate::{
-    config::Config,
-    error::{Context, Result, RunError},
-    provenance::Provenance,
-};
-
-/// A row of metrics.
-pub type Row = Map<String, Value>;
+use super::{rows::Row, stored::StoredRun};
+use crate::{config::Config, error::Result, provenance::Provenance};
 
 /// What a run has recorded.
 #[derive(Debug, Clone)]
@@ -31,15 +22,19 @@ impl Recorded {
     /// Reads the run at `path`.
     ///
     /// # Errors
-    /// [`RunError::NotARun`] if there is none, [`RunError::BadData`] with the first line that is no row.
+    /// [`RunError::NotARun`](crate::RunError::NotARun) if there is none, [`RunError::BadData`](crate::RunError::BadData) with the
+    /// first line that is no row of it, or if it is finished and something is not as it was then.
     pub fn open(path: &Path) -> Result<Self> {
-        let config = read_config(path)?;
-        let record = read_record(path);
+        let run = StoredRun::open(path)?;
+        let mut rows = Vec::new();
+        run.rows(|row| rows.push(timeless(row)))?;
+        let weights = run.weights()?;
+        let record = run.record.as_ref();
         Ok(Self {
-            config,
             provenance: record.and_then(|record| record.provenance.last().cloned()),
-            rows: read_rows(&path.join(METRICS))?,
-            weights: if_there(fs::read(path.join(WEIGHTS)), &path.join(WEIGHTS))?,
+            rows,
+            weights,
+            config: run.config.config,
         })
     }
 }
@@ -48,24 +43,4 @@ impl Recorded {
 pub fn timeless(mut row: Row) -> Row {
     row.retain(|name, _| !name.starts_with("sys/") && name != "provenance");
     row
-}
-
-fn read_rows(path: &Path) -> Result<Vec<Row>> {
-    let text = if_there(fs::read_to_string(path), path)?.unwrap_or_default();
-    // A run that goes on may be in the middle of a line.
-    let whole = text.rsplit_once('\n').map_or("", |(lines, _)| lines);
-    let rows = whole.lines().enumerate().map(|(line, text)| {
-        let row = serde_json::from_str(text).map_err(|error| RunError::BadData {
-            message: format!("{}:{}: {error}", path.display(), line + 1),
-        })?;
-        Ok(timeless(row))
-    });
-    rows.collect()
-}
-
-fn if_there<T>(read: io::Result<T>, path: &Path) -> Result<Option<T>> {
-    match read {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-        read => Ok(Some(read.with_context(|| cannot("read", path))?)),
-    }
 }

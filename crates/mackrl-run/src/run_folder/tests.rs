@@ -17,7 +17,7 @@ fn a_run_is_read_as_it_was_written() {
     let run = Run::open(&path).unwrap();
     assert_eq!(run.config, config);
     assert_eq!(run.weights, [1, 2, 3]);
-    assert_eq!(recorded_status(&path), Some(Status::Finished));
+    assert_eq!(StoredRun::open(&path).unwrap().status(), Status::Finished);
 }
 
 #[test]

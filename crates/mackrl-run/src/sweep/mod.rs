@@ -66,8 +66,12 @@ impl Entry {
     /// [`RunError::OtherConfiguration`] if the folder holds a run with another configuration.
     pub fn state(&self) -> Result<State> {
         if !run_folder::is_run(&self.folder) {
-            RunFolder::check_free(&self.folder)?;
-            return Ok(State::Waiting);
+            match RunFolder::check_free(&self.folder) {
+                Ok(()) => return Ok(State::Waiting),
+                // Another process has begun it since.
+                Err(RunError::UnfinishedRun { .. }) => {}
+                Err(error) => return Err(error),
+            }
         }
         let (config, description) = run_folder::read_description(&self.folder)?;
         if let Some(key) = self.first_difference(&config) {
@@ -89,15 +93,21 @@ impl Entry {
         differing.next()
     }
 
-    /// Makes the folder ready for a process that goes on with the run in it.
+    /// Makes the folder ready for a process that goes on with the run in it, and says so; where another process is doing that now,
+    /// says no.
     ///
     /// # Errors
     /// If the folder cannot be made.
-    pub fn prepare(&self) -> Result<()> {
+    pub fn prepare(&self) -> Result<bool> {
         if run_folder::is_run(&self.folder) {
-            return Ok(());
+            return Ok(true);
         }
-        RunFolder::prepare(&self.folder, &self.config, 1)
+        match RunFolder::prepare(&self.folder, &self.config, 1) {
+            Err(RunError::FolderLocked { .. }) => Ok(false),
+            Err(RunError::UnfinishedRun { .. }) => Ok(true),
+            Err(RunError::FolderInUse { .. }) if run_folder::is_run(&self.folder) => Ok(true),
+            outcome => outcome.map(|()| true),
+        }
     }
 
     /// What the run last wrote down.

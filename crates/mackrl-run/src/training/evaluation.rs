@@ -9,7 +9,6 @@ use mackrl::{
     Error,
     experience::{Collector, Episode, PlaySettings},
     policy::{Behaviour, Parameters, Policy, Recording, Tally},
-    statistics::mean_and_standard_error,
 };
 use mackrl_env::{EnvironmentSpec, EpisodeKey, Stream};
 use serde::{Serialize, Serializer, ser::SerializeMap};
@@ -172,9 +171,14 @@ impl Evaluator {
         };
         self.samples.clear();
         let mut tally = Tally::default();
-        let keys: Vec<EpisodeKey> = (0..episodes as u64).map(key).collect();
-        for keys in keys.chunks(self.collector.environments()) {
-            self.collector.play(parameters, keys, settings)?;
+        let mut keys = Vec::with_capacity(self.collector.environments());
+        let mut next = 0;
+        while next < episodes as u64 {
+            let end = (next + self.collector.environments() as u64).min(episodes as u64);
+            keys.clear();
+            keys.extend((next..end).map(&key));
+            next = end;
+            self.collector.play(parameters, &keys, settings)?;
             tally.merge(&self.collector.tally());
             let pieces = self.collector.pieces();
             for episode in pieces.flat_map(|piece| &piece.experience.episodes) {
@@ -201,22 +205,70 @@ enum Measure {
     Statistic(usize),
 }
 
-/// What was measured in every episode, by names and in the order of [`Evaluation::quantities`].
+/// What was measured in every episode, by names and in the order of [`Evaluation::quantities`]. Its size does not depend on how
+/// many episodes there are.
 #[derive(Debug)]
 struct Samples {
-    measured: Vec<(String, Measure, Vec<f64>)>,
+    measured: Vec<(String, Measure, Sample)>,
+}
+
+/// Sums over a sample whose members are not kept.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    count: u64,
+    sum: f64,
+    /// The mean so far, and the sum of squared distances from it (Welford, "Note on a method for calculating corrected sums of
+    /// squares and products", 1962).
+    running_mean: f64,
+    squares: f64,
+}
+
+/// Of no members: a sum begins with -0, which no member changes the sign of.
+impl Default for Sample {
+    fn default() -> Self {
+        Self {
+            count: 0,
+            sum: -0.0,
+            running_mean: 0.0,
+            squares: 0.0,
+        }
+    }
+}
+
+impl Sample {
+    fn add(&mut self, value: f64) {
+        self.count += 1;
+        self.sum += value;
+        let before = value - self.running_mean;
+        self.running_mean += before / self.count as f64;
+        self.squares += before * (value - self.running_mean);
+    }
+
+    /// Mean and standard error; of one member 0, of none not a number.
+    fn mean_and_standard_error(&self) -> (f64, f64) {
+        let count = self.count as f64;
+        let mean = self.sum / count;
+        if self.count < 2 {
+            return (mean, 0.0);
+        }
+        (mean, (self.squares / (count - 1.0) / count).sqrt())
+    }
 }
 
 impl Samples {
     fn of(spec: &EnvironmentSpec) -> Self {
         let own = |index: usize| {
             let name = &spec.statistics[index].name;
-            (name.to_string(), Measure::Statistic(index), Vec::new())
+            (
+                name.to_string(),
+                Measure::Statistic(index),
+                Sample::default(),
+            )
         };
         let others = (0..spec.statistics.len()).filter(|index| spec.success != Some(*index));
         let always = [
-            ("return".to_owned(), Measure::Return, Vec::new()),
-            ("ep_length".to_owned(), Measure::Length, Vec::new()),
+            ("return".to_owned(), Measure::Return, Sample::default()),
+            ("ep_length".to_owned(), Measure::Length, Sample::default()),
         ];
         let success = spec.success.map(own);
         Self {
@@ -229,14 +281,14 @@ impl Samples {
     }
 
     fn clear(&mut self) {
-        self.measured
-            .iter_mut()
-            .for_each(|(_, _, sample)| sample.clear());
+        for (_, _, sample) in &mut self.measured {
+            *sample = Sample::default();
+        }
     }
 
     fn add(&mut self, episode: &Episode) {
         for (_, measure, sample) in &mut self.measured {
-            sample.push(match *measure {
+            sample.add(match *measure {
                 Measure::Return => episode.total_reward(),
                 Measure::Length => episode.steps() as f64,
                 Measure::Statistic(index) => episode.statistics_s[index],
@@ -245,8 +297,8 @@ impl Samples {
     }
 
     fn quantities(&self) -> Vec<Quantity> {
-        let quantity = |(name, _, sample): &(String, Measure, Vec<f64>)| {
-            let (mean, standard_error) = mean_and_standard_error(sample);
+        let quantity = |(name, _, sample): &(String, Measure, Sample)| {
+            let (mean, standard_error) = sample.mean_and_standard_error();
             Quantity {
                 name: name.clone(),
                 mean,
@@ -254,5 +306,25 @@ impl Samples {
             }
         };
         self.measured.iter().map(quantity).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mackrl::statistics::mean_and_standard_error;
+
+    use super::*;
+
+    #[test]
+    fn a_sample_that_is_not_kept_has_the_statistics_of_one_that_is() {
+        for length in [1, 2, 3, 97] {
+            let kept: Vec<f64> = (0..length).map(|i| f64::from(i * i % 11) / 3.0).collect();
+            let mut sample = Sample::default();
+            kept.iter().for_each(|&value| sample.add(value));
+            let (mean, error) = sample.mean_and_standard_error();
+            let (expected_mean, expected_error) = mean_and_standard_error(&kept);
+            assert_eq!(mean, expected_mean, "the same sum, to the bit");
+            assert!((error - expected_error).abs() < 1e-12, "{length}");
+        }
     }
 }

@@ -7,6 +7,7 @@
 pub mod assembly;
 mod checkpoint;
 mod comparison;
+mod description;
 mod evaluation;
 mod experience;
 mod metrics;

@@ -15,8 +15,13 @@ use mackrl::{
 use mackrl_env::{EpisodeKey, Statistic, Stream};
 
 use super::{
-    Checkpoint, Evaluation, MetricRow, StoredWeights, assembly, checkpoint::Counters,
-    evaluation::Evaluator, experience::ExperienceHash, metrics::is_explained, write_weights,
+    Checkpoint, Evaluation, MetricRow, StoredWeights, assembly,
+    checkpoint::Counters,
+    description::{description, with_description},
+    evaluation::Evaluator,
+    experience::ExperienceHash,
+    metrics::is_explained,
+    write_weights,
 };
 use crate::config::Config;
 
@@ -151,10 +156,23 @@ impl Trainer {
         Ok(self.row_of_batch())
     }
 
-    /// The weights of the policy and of whatever else the algorithm keeps, as safetensors.
+    /// The weights of the policy and of whatever else the algorithm keeps, as safetensors without a word.
     #[must_use]
     pub fn weights(&self) -> Vec<u8> {
         write_weights(&self.algorithm.models())
+    }
+
+    /// As [`Self::weights`], with what somebody needs to know who acts with them: the file that a run leaves.
+    #[must_use]
+    pub fn described_weights(&self) -> Vec<u8> {
+        let exploration = self.algorithm.behaviour(self.steps_env).exploration;
+        let texts = description(
+            &self.config,
+            &self.world,
+            self.algorithm.policy(),
+            (self.steps_env, exploration),
+        );
+        with_description(&self.weights(), &texts)
     }
 
     /// The latest batch.

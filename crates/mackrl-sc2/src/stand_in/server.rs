@@ -22,6 +22,8 @@ use crate::{
 
 /// How long a client may take to ask for the websocket, and to take an answer.
 const PATIENCE: Duration = Duration::from_secs(30);
+/// How long a client may say nothing before another may come: longer than learning between two episodes takes.
+const IDLE: Duration = Duration::from_secs(3600);
 /// How long a hanging server hangs: longer than anybody waits.
 const FOR_EVER: Duration = Duration::from_secs(3600);
 
@@ -109,7 +111,7 @@ impl StandIn {
     fn serve_client(&mut self, stream: TcpStream) -> Result<After, WebsocketError> {
         let mut connection = Connection::accept(stream, PATIENCE)?;
         loop {
-            let message = match connection.receive(None) {
+            let message = match connection.receive(Some(IDLE)) {
                 Err(WebsocketError::Closed) => return Ok(After::Wait),
                 message => message?,
             };

@@ -32,6 +32,10 @@ pub(super) fn answer(head: &str) -> (String, bool) {
     if words.next() != Some(PATH) {
         return refusal("404 Not Found");
     }
+    // Browsers send it for every page, and no program of ours does: a page of any site could end the game otherwise.
+    if header(head, "origin").is_some() {
+        return refusal("403 Forbidden");
+    }
     let upgrades =
         header(head, "upgrade").is_some_and(|value| value.eq_ignore_ascii_case("websocket"));
     let key = header(head, "sec-websocket-key").filter(|_| upgrades);
@@ -113,6 +117,10 @@ mod tests {
             (head.replace("/sc2api", "/"), "404"),
             (head.replace("Upgrade: websocket", "Upgrade: h2c"), "400"),
             (head.replace("Version: 13", "Version: 8"), "426"),
+            (
+                head.replace("Upgrade:", "Origin: https://evil.example\r\nUpgrade:"),
+                "403",
+            ),
             (String::new(), "405"),
         ] {
             let (response, is_granted) = answer(&wrong);

@@ -5,7 +5,8 @@
 //! beginning, then everybody moves, then all damage lands at once: neither side gains by the order in which units are visited.
 //!
 //! Times are fractions of loops and are kept exactly: a marine with a period of 13.77 loops shoots after 14 loops three times
-//! out of four and after 13 the fourth time (before jitter). The engine keeps fixed-point numbers; we keep f32.
+//! out of four and after 13 the fourth time (before jitter). Positions are multiples
+//! of 2⁻¹² map units, as the engine's are, so that differences of them are exact.
 
 mod battle;
 mod chance;

@@ -88,6 +88,29 @@ impl GroupEncoder {
             }
     }
 
+    /// The parts of an input, in their order, and how many numbers each has; together they are [`Self::size`].
+    #[must_use]
+    pub fn parts(&self) -> Vec<(&'static str, usize)> {
+        let places = self.group_size * self.relative();
+        match self.features {
+            CommonKnowledgeFeatures::Complete => vec![
+                ("places", places * self.entities),
+                (
+                    "attributes",
+                    self.entities * (self.entity_features - self.position_features),
+                ),
+                ("available_actions", self.group_size * self.actions),
+            ],
+            CommonKnowledgeFeatures::Thin => vec![
+                (
+                    "thin_enemies",
+                    self.group_size * self.thin_enemy() * (self.entities - self.agents),
+                ),
+                ("thin_agents", places * self.agents),
+            ],
+        }
+    }
+
     /// Numbers about an entity relative to a member: known, and where there are positions distance and Δ.
     const fn relative(&self) -> usize {
         match self.position_features {

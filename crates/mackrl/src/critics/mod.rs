@@ -7,7 +7,7 @@
 mod central;
 mod team;
 
-pub use central::{CentralCritic, CriticReport, CriticSettings, CriticState};
+pub use central::{CentralCritic, CriticMinibatch, CriticReport, CriticSettings, CriticState};
 pub use team::{ReturnScale, TeamCritic, TeamCriticSettings, ValueInputs};
 
 /// What the names of the critic's parameters begin with.

@@ -1,28 +1,36 @@
 //! The certificate: a trained team's central run equals N agents that exchange nothing.
 //!
-//! Two checks, each over whole episodes, sampled and greedy:
+//! Five checks over whole episodes, sampled and greedy, of actions and, bit for bit, of what controllers read and of the
+//! log-probabilities that they give:
 //!
 //! 1. **Separate agents.** Each agent, reached through an [`AgentLink`] (another process, for `mackrl certify`), gets its own
-//!    local views and nothing else. Its every action must equal the central run's, and so must the bits that its controllers
-//!    read.
+//!    local views and nothing else, and has to tell of every controller of its groups.
 //! 2. **Altered worlds.** The central run itself is repeated once per agent in a world in which everything that the agent does
 //!    not see is replaced by noise: the state, unseen entities, all others' observations and available actions, what others see
-//!    beyond it. The agent's actions must not change. This catches code that reads what it must not, however it got there.
+//!    beyond it. This catches code that reads what it must not, however it got there.
 //!    Whether an unseen agent is alive is kept, since it decides only which rows are computed.
+//! 3. **Unseen numbers.** The agent alone looks at a world in which all that it does not see is no number.
+//! 4. **Altered states.** At one step of each episode, for each agent, the *world* is asked to alter its state beyond the agent's
+//!    sight: what the agent observes must not change. The checks before take a view for local; this one tests it.
+//! 5. **Other key.** The central run is repeated with another key of its choices: as long as an agent has done the same, its
+//!    controllers have to compute the same.
+//!
+//! The key that choices are drawn from is not the key of the world, so that an agent cannot compute the world's dice from what
+//! it is given.
 
-use mackrl_env::{
-    Action, AgentId, Draw, EntityId, EntitySet, Environment, EnvironmentSpec, EpisodeKey,
-    Observations, StepError, Stream,
+use mackrl_env::{Action, AgentId, Draw, Environment, EnvironmentSpec, Observations, StepError};
+
+use super::{
+    alteration::{Kind, alter_unseen, is_same_view},
+    central::{Central, Keys},
+    computed::{Compared, Computed, Difference},
+    message::{Answer, Request, ViewMessage},
+    report::{Certificate, Check, DifferingInput, Isolation, Place},
 };
-use serde::{Deserialize, Serialize};
-
-use super::message::{Answer, Request, ViewMessage, fingerprints};
 use crate::{
     Error,
-    experience::{ATTEMPTS_MAX, Experience},
-    policy::{
-        Behaviour, ControllerId, ControllerInput, Mode, Parameters, Policy, Recording, Situation,
-    },
+    experience::ATTEMPTS_MAX,
+    policy::{Behaviour, ControllerId, ControllerInput, Mode, Parameters, Policy},
 };
 
 /// An agent that can be asked for its actions.
@@ -34,71 +42,13 @@ pub trait AgentLink {
     fn ask(&mut self, request: Request) -> Result<Option<Answer>, Error>;
 }
 
-/// Which check found a difference.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Check {
-    /// An agent on its own chose or read something else than the central run.
-    SeparateAgents,
-    /// An agent's action depends on what it does not see.
-    AlteredWorlds,
-}
-
-/// What was compared, and what was found.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Certificate {
-    /// Episodes played in each mode, sampled and greedy.
-    pub episodes: usize,
-    /// Environment steps of both modes.
-    pub steps: u64,
-    /// Actions of separate agents that were compared.
-    pub actions_compared: u64,
-    /// Inputs of controllers that were compared, bit for bit.
-    pub inputs_compared: u64,
-    /// Actions in altered worlds that were compared.
-    pub altered_actions_compared: u64,
-    /// Comparisons of either check that failed; 0 if the run is decentralised.
-    pub mismatches: u64,
-    /// Those of them that were found in altered worlds.
-    pub mismatches_in_altered_worlds: u64,
-    /// The first difference.
-    pub first_mismatch: Option<CounterExample>,
-}
-
-/// One difference.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct CounterExample {
-    /// Which check found it.
-    pub check: Check,
-    /// Sampled or greedy.
-    pub mode: Mode,
-    /// Number of the episode, from 0.
-    pub episode: u64,
-    /// Step of the episode, from 0.
-    pub step: usize,
-    /// Whose action or input differs.
-    pub agent: AgentId,
-    /// The controller that read something else, if one did.
-    pub controller: Option<ControllerId>,
-    /// What the agent does in the central run.
-    pub central_action: Action,
-    /// What it does on its own, or in the altered world.
-    pub agent_action: Action,
-    /// The first input that differs, if one does.
-    pub differing_input: Option<DifferingInput>,
-}
-
-/// One number that a controller reads differently.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct DifferingInput {
-    /// Whose input.
-    pub controller: ControllerId,
-    /// Place among its inputs.
-    pub index: usize,
-    /// What the central run reads there.
-    pub central: f32,
-    /// What the agent reads there.
-    pub agent: f32,
+/// Whether a world can be played again from the name of an episode, and so be altered in the middle of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Repetition {
+    /// The same key and the same actions give the same episode.
+    Exact,
+    /// They do not, as in the real game.
+    Impossible,
 }
 
 /// What is to be certified.
@@ -113,59 +63,76 @@ pub struct Subject<'a, 'l> {
     pub parameters: &'a Parameters,
     /// A world to play in.
     pub environment: &'a mut dyn Environment,
+    /// Whether the world can be played again.
+    pub repetition: Repetition,
     /// The agents, one link each.
     pub links: &'a mut [Box<dyn AgentLink + 'l>],
+    /// What keeps the agents apart.
+    pub isolation: Isolation,
     /// Seed of the episodes.
     pub seed: u64,
     /// How choices are made in the first of the two modes: sampled.
     pub sampled: Behaviour,
 }
 
-/// One episode of the central run: what there was to see, and what was done.
+/// One episode of the central run: what there was to see, and what was done and computed.
 struct Recorded {
+    keys: Keys,
+    behaviour: Behaviour,
     observations_t: Vec<Observations>,
     actions_tn: Vec<Vec<Action>>,
-}
-
-/// Where a comparison stands.
-#[derive(Clone, Copy)]
-struct Place {
-    mode: Mode,
-    key: EpisodeKey,
-    step: usize,
+    computed_tn: Vec<Vec<Computed>>,
 }
 
 impl Subject<'_, '_> {
-    /// Plays `episodes` episodes in each mode, both checks on each; `progress` hears how many of all are done.
+    /// Plays `episodes` episodes in each mode, all checks on each; `progress` is told how many of all are done.
     ///
     /// # Errors
-    /// If an agent cannot be reached, or an environment refuses an action.
+    /// If an agent cannot be reached, or an environment refuses an action; [`Error::Data`] if there was nothing to compare, which
+    /// proves nothing.
     pub fn certify(
         &mut self,
         episodes: usize,
         mut progress: impl FnMut(usize, usize),
     ) -> Result<Certificate, Error> {
+        let agents = self.environment.spec().agents;
         let mut certificate = Certificate {
+            agents,
+            isolation: self.isolation,
             episodes,
             ..Certificate::default()
         };
+        let mut inputs_n = vec![0_usize; agents];
+        let total = episodes.saturating_mul(2);
         let mut done = 0;
         for behaviour in [self.sampled, Behaviour::GREEDY] {
             for episode in 0..episodes as u64 {
-                let key = EpisodeKey::new(self.seed, Stream::Evaluation, episode);
-                let recorded = self.record(key, behaviour, &mut certificate)?;
-                self.compare_altered_worlds(key, behaviour, &recorded, &mut certificate)?;
+                let keys = Keys::new(self.seed, episode);
+                let recorded = self.record(keys, behaviour, &mut certificate)?;
+                for computed in recorded.computed_tn.iter().flatten().enumerate() {
+                    inputs_n[computed.0 % agents] += computed.1.inputs.len();
+                }
+                self.compare_other_key(&recorded, &mut certificate)?;
+                for agent in (0..agents).map(AgentId::new) {
+                    self.compare_altered_worlds(agent, &recorded, &mut certificate)?;
+                    self.compare_unseen_numbers(agent, &recorded, &mut certificate);
+                }
                 done += 1;
-                progress(done, 2 * episodes);
+                progress(done, total);
             }
         }
-        Ok(certificate)
+        match inputs_n.iter().position(|inputs| *inputs == 0) {
+            Some(agent) => Err(Error::Data(format!(
+                "nothing is certified: no controller of agent {agent} was ever compared"
+            ))),
+            None => Ok(certificate),
+        }
     }
 
     /// Plays an episode, again from its beginning if the world fails under it; what was compared in vain does not count.
     fn record(
         &mut self,
-        key: EpisodeKey,
+        keys: Keys,
         behaviour: Behaviour,
         certificate: &mut Certificate,
     ) -> Result<Recorded, Error> {
@@ -173,7 +140,7 @@ impl Subject<'_, '_> {
         loop {
             let mut attempt = certificate.clone();
             attempts += 1;
-            match self.compare_separate_agents(key, behaviour, &mut attempt) {
+            match self.compare_separate_agents(keys, behaviour, &mut attempt) {
                 Err(Error::Step(StepError::Interrupted(failure)))
                     if failure.can_be_repeated && attempts < ATTEMPTS_MAX => {}
                 outcome => {
@@ -187,44 +154,43 @@ impl Subject<'_, '_> {
     /// Plays an episode centrally and by separate agents at once.
     fn compare_separate_agents(
         &mut self,
-        key: EpisodeKey,
+        keys: Keys,
         behaviour: Behaviour,
         certificate: &mut Certificate,
     ) -> Result<Recorded, Error> {
         let spec = self.environment.spec().clone();
         let mut observations = Observations::new(&spec, 1);
-        let mut actor = self.policy.actor(1);
+        let mut central = Central::begin(self.policy, self.parameters, spec.agents);
         let mut recorded = Recorded {
+            keys,
+            behaviour,
             observations_t: Vec::new(),
             actions_tn: Vec::new(),
+            computed_tn: Vec::new(),
         };
-        let mut experience = Experience::default();
-        actor.begin(Recording::Off, &mut experience);
         for link in &mut *self.links {
+            let key = keys.choices;
             link.ask(Request::Begin { key, behaviour })?;
         }
-        self.environment.reset(key, &mut observations.row_mut(0));
+        self.environment
+            .reset(keys.world, &mut observations.row_mut(0));
         for step in 0.. {
-            let mut action_n = vec![Action::default(); spec.agents];
-            let situation = situation(step, &key, &observations, behaviour);
-            actor.act(self.parameters, situation, &mut experience, &mut action_n)?;
-            let central = actor.controller_inputs(&experience, 0);
-            let place = Place {
-                mode: behaviour.mode,
-                key,
-                step,
-            };
-            for agent in (0..spec.agents).map(AgentId::new) {
+            let action_n = central.act(step, &keys.choices, &observations, behaviour)?;
+            let computed_n = central.computed(&observations, &action_n);
+            for (agent, computed) in computed_n.iter().enumerate() {
+                let agent = AgentId::new(agent);
+                let place = recorded.place(Check::SeparateAgents, step, agent);
                 let view = ViewMessage::from(observations.local_view(0, agent));
                 let link = &mut *self.links[agent.index()];
-                let action = action_n[agent.index()];
-                compare_agent(link, place, agent, view, action, &central, certificate)?;
+                let inputs = || central.inputs();
+                compare_agent(link, place, view, computed, &inputs, certificate)?;
             }
             recorded.observations_t.push(observations.clone());
             let time_step = self
                 .environment
                 .step(&action_n, &mut observations.row_mut(0))?;
             recorded.actions_tn.push(action_n);
+            recorded.computed_tn.push(computed_n);
             certificate.steps += 1;
             if time_step.end.is_some() {
                 break;
@@ -233,114 +199,226 @@ impl Subject<'_, '_> {
         Ok(recorded)
     }
 
-    /// Repeats the central run of an episode for each agent, in a world that is the same for that agent alone.
+    /// Repeats the central run of an episode in a world that is the same for one agent alone. At one step the world itself makes
+    /// it so, if it can.
     fn compare_altered_worlds(
-        &self,
-        key: EpisodeKey,
-        behaviour: Behaviour,
+        &mut self,
+        agent: AgentId,
         recorded: &Recorded,
         certificate: &mut Certificate,
     ) -> Result<(), Error> {
-        let spec = self.environment.spec();
-        for agent in (0..spec.agents).map(AgentId::new) {
-            let mut actor = self.policy.actor(1);
-            let mut experience = Experience::default();
-            actor.begin(Recording::Off, &mut experience);
-            let steps = recorded
-                .observations_t
-                .iter()
-                .zip(&recorded.actions_tn)
-                .enumerate();
-            for (step, (observations, action_n)) in steps {
-                let mut altered = observations.clone();
-                alter_unseen(&mut altered, spec, agent, &key, step);
-                let mut altered_n = vec![Action::default(); spec.agents];
-                let situation = situation(step, &key, &altered, behaviour);
-                actor.act(self.parameters, situation, &mut experience, &mut altered_n)?;
-                certificate.altered_actions_compared += 1;
-                let (central, found) = (action_n[agent.index()], altered_n[agent.index()]);
-                if central != found {
-                    certificate.mismatches_in_altered_worlds += 1;
-                    certificate.note(|| CounterExample {
-                        check: Check::AlteredWorlds,
-                        mode: behaviour.mode,
-                        episode: key.episode,
-                        step,
-                        agent,
-                        controller: None,
-                        central_action: central,
-                        agent_action: found,
-                        differing_input: None,
-                    });
+        let spec = self.environment.spec().clone();
+        let altered_at = recorded.step_to_alter(agent);
+        let altered_state = self.altered_state(&spec, agent, recorded, altered_at)?;
+        if let Some(altered) = &altered_state {
+            let check = Check::AlteredStates;
+            certificate.count(check, Compared::default());
+            if !is_same_view(altered, &recorded.observations_t[altered_at], agent) {
+                let action = recorded.actions_tn[altered_at][agent.index()];
+                let place = recorded.place(check, altered_at, agent);
+                let found = (Difference::Observation, None);
+                certificate.note(place, found, [action; 2], None);
+            }
+        }
+        let mut central = Central::begin(self.policy, self.parameters, spec.agents);
+        let kind = Kind::of_episode(recorded.keys.world.episode);
+        for (step, observations) in recorded.observations_t.iter().enumerate() {
+            let altered = match &altered_state {
+                Some(altered) if step == altered_at => altered.clone(),
+                _ => {
+                    let mut altered = observations.clone();
+                    let moment = (&recorded.keys.world, step);
+                    alter_unseen(&mut altered, &spec, agent, moment, kind);
+                    altered
                 }
+            };
+            let key = &recorded.keys.choices;
+            let action_n = central.act(step, key, &altered, recorded.behaviour)?;
+            let found = &central.computed(&altered, &action_n)[agent.index()];
+            recorded.compare(Check::AlteredWorlds, step, agent, found, certificate);
+        }
+        Ok(())
+    }
+
+    /// What everybody would observe at step `at` of an episode if the state of the world were another one beyond the sight of
+    /// `agent`; nothing, if the world cannot say or nothing is unseen.
+    fn altered_state(
+        &mut self,
+        spec: &EnvironmentSpec,
+        agent: AgentId,
+        recorded: &Recorded,
+        at: usize,
+    ) -> Result<Option<Observations>, Error> {
+        if self.repetition == Repetition::Impossible {
+            return Ok(None);
+        }
+        let mut observations = Observations::new(spec, 1);
+        let row = &mut observations.row_mut(0);
+        self.environment.reset(recorded.keys.world, row);
+        for action_n in &recorded.actions_tn[..at] {
+            self.environment.step(action_n, row)?;
+        }
+        let is_altered = self
+            .environment
+            .alter_unseen(agent, recorded.keys.other, row);
+        Ok(is_altered.then_some(observations))
+    }
+
+    /// Lets an agent alone play an episode in a world in which all that it does not see is no number.
+    fn compare_unseen_numbers(
+        &self,
+        agent: AgentId,
+        recorded: &Recorded,
+        certificate: &mut Certificate,
+    ) {
+        let spec = self.environment.spec();
+        let mut executor = self.policy.executor(agent);
+        executor.begin();
+        for (step, observations) in recorded.observations_t.iter().enumerate() {
+            let mut altered = observations.clone();
+            let moment = (&recorded.keys.world, step);
+            alter_unseen(&mut altered, spec, agent, moment, Kind::NotANumber);
+            let action = executor.act(
+                self.parameters,
+                altered.local_view(0, agent),
+                &recorded.keys.choices,
+                step,
+                recorded.behaviour,
+            );
+            let (inputs, outputs) = (executor.controller_inputs(), executor.controller_outputs());
+            let found = Computed::of(agent, action, &inputs, &outputs);
+            recorded.compare(Check::UnseenNumbers, step, agent, &found, certificate);
+        }
+    }
+
+    /// Repeats the central run of an episode with another key. What an agent's controllers compute is a function of what was seen
+    /// and of what the agent did; of the key it is none. In greedy play actions are no function of it either, if the policy
+    /// says so.
+    fn compare_other_key(
+        &self,
+        recorded: &Recorded,
+        certificate: &mut Certificate,
+    ) -> Result<(), Error> {
+        let agents = self.environment.spec().agents;
+        let decides_nothing =
+            recorded.behaviour.mode == Mode::Greedy && !self.policy.draws_when_greedy();
+        let mut central = Central::begin(self.policy, self.parameters, agents);
+        let mut has_done_the_same_n = vec![true; agents];
+        for (step, observations) in recorded.observations_t.iter().enumerate() {
+            let key = &recorded.keys.other;
+            let action_n = central.act(step, key, observations, recorded.behaviour)?;
+            for (agent, mut found) in central
+                .computed(observations, &action_n)
+                .into_iter()
+                .enumerate()
+            {
+                if !has_done_the_same_n[agent] {
+                    continue;
+                }
+                let mut expected = recorded.computed_tn[step][agent].clone();
+                has_done_the_same_n[agent] = expected.action == found.action;
+                if !decides_nothing {
+                    // Other actions may be drawn, and other groups be asked.
+                    found.action = expected.action;
+                    let is_asked =
+                        |own: &ControllerId| found.outputs.iter().any(|(other, _)| other == own);
+                    expected
+                        .outputs
+                        .retain(|(controller, _)| is_asked(controller));
+                }
+                let place = recorded.place(Check::OtherKey, step, AgentId::new(agent));
+                compare(place, &expected, &found, certificate);
             }
         }
         Ok(())
     }
 }
 
-impl Certificate {
-    /// Counts a mismatch and keeps it if it is the first.
-    fn note(&mut self, counter_example: impl FnOnce() -> CounterExample) {
-        self.mismatches += 1;
-        self.first_mismatch.get_or_insert_with(counter_example);
+impl Recorded {
+    fn place(&self, check: Check, step: usize, agent: AgentId) -> Place {
+        Place {
+            check,
+            mode: self.behaviour.mode,
+            episode: self.keys.world.episode,
+            step,
+            agent,
+        }
+    }
+
+    /// Compares what was found for an agent at a step with what the central run computed.
+    fn compare(
+        &self,
+        check: Check,
+        step: usize,
+        agent: AgentId,
+        found: &Computed,
+        certificate: &mut Certificate,
+    ) {
+        let expected = &self.computed_tn[step][agent.index()];
+        compare(self.place(check, step, agent), expected, found, certificate);
+    }
+
+    /// The step at which the world is altered for an agent.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a share of a small count"
+    )]
+    fn step_to_alter(&self, agent: AgentId) -> usize {
+        let draw = Draw::Setup((1 << 27) + 2 + agent.index());
+        let uniform = self.keys.other.uniform(0, draw);
+        (uniform * self.observations_t.len() as f64) as usize
     }
 }
 
-/// Asks one agent for its action and compares it, and what its controllers read, with the central run.
+fn compare(place: Place, expected: &Computed, found: &Computed, certificate: &mut Certificate) {
+    let mut compared = Compared::default();
+    let difference = expected.first_difference(found, &mut compared);
+    certificate.count(place.check, compared);
+    if let Some(difference) = difference {
+        certificate.note(place, difference, [expected.action, found.action], None);
+    }
+}
+
+/// Asks one agent for its action and compares it, and what its controllers read and gave, with the central run.
 fn compare_agent(
     link: &mut dyn AgentLink,
     place: Place,
-    agent: AgentId,
     view: ViewMessage,
-    central_action: Action,
-    central_inputs: &[ControllerInput],
+    central: &Computed,
+    central_inputs: &dyn Fn() -> Vec<ControllerInput>,
     certificate: &mut Certificate,
 ) -> Result<(), Error> {
-    let answer = link.ask(Request::Look {
-        step: place.step,
-        view,
-    })?;
+    let step = place.step;
     let Some(Answer::Action {
         action,
-        fingerprints: own,
-    }) = answer
+        inputs,
+        outputs,
+    }) = link.ask(Request::Look { step, view })?
     else {
+        let agent = place.agent;
         return Err(Error::Data(format!(
             "agent {agent} did not answer with an action"
         )));
     };
-    let central = fingerprints(central_inputs);
-    let mut differing = None;
-    for (controller, fingerprint) in &own {
-        // The central run drops controllers of the dead, whose choice is forced; an agent cannot always know.
-        let Some((_, central)) = central.iter().find(|(other, _)| other == controller) else {
-            continue;
-        };
-        certificate.inputs_compared += 1;
-        if central != fingerprint {
-            differing.get_or_insert_with(|| controller.clone());
-        }
-    }
-    certificate.actions_compared += 1;
-    if action == central_action && differing.is_none() {
-        return Ok(());
-    }
-    let differing_input = match &differing {
-        Some(controller) => locate_difference(link, controller, central_inputs)?,
-        None => None,
+    let own = Computed {
+        action,
+        inputs,
+        outputs,
     };
-    certificate.note(|| CounterExample {
-        check: Check::SeparateAgents,
-        mode: place.mode,
-        episode: place.key.episode,
-        step: place.step,
-        agent,
-        controller: differing,
-        central_action,
-        agent_action: action,
-        differing_input,
-    });
+    let mut compared = Compared::default();
+    let found = central.first_difference(&own, &mut compared);
+    certificate.count(place.check, compared);
+    let Some(found) = found else {
+        return Ok(());
+    };
+    let differing_input = match &found {
+        (Difference::Input, Some(controller)) => {
+            locate_difference(link, controller, &central_inputs())?
+        }
+        _ => None,
+    };
+    certificate.note(place, found, [central.action, action], differing_input);
     Ok(())
 }
 
@@ -370,92 +448,4 @@ fn locate_difference(
         central: central[index],
         agent: agent[index],
     }))
-}
-
-/// One environment's situation.
-fn situation<'a>(
-    step: usize,
-    key: &'a EpisodeKey,
-    observations: &'a Observations,
-    behaviour: Behaviour,
-) -> Situation<'a> {
-    let keys = std::slice::from_ref(key);
-    Situation {
-        step,
-        playing: &[0],
-        keys,
-        observations,
-        behaviour,
-    }
-}
-
-/// Replaces everything that `agent` does not see by noise.
-fn alter_unseen(
-    observations: &mut Observations,
-    spec: &EnvironmentSpec,
-    agent: AgentId,
-    key: &EpisodeKey,
-    step: usize,
-) {
-    let mut noise = Noise {
-        key: *key,
-        step,
-        draws: agent.index() << 20,
-    };
-    let seen = observations.visible(0)[agent.index()];
-    let row = observations.row_mut(0);
-    noise.fill(row.state_g);
-    for (entity, features) in row.entity_mf.chunks_mut(spec.entity_features).enumerate() {
-        if !seen.contains(EntityId::new(entity)) {
-            noise.fill(features);
-        }
-    }
-    for other in (0..spec.agents)
-        .map(AgentId::new)
-        .filter(|&other| other != agent)
-    {
-        let n = other.index();
-        noise.fill(part(row.observation_no, n, spec.observation_size));
-        let available_a = part(row.available_na, n, spec.actions);
-        available_a.fill_with(|| noise.uniform() < 0.5);
-        available_a[spec.actions - 1] = true;
-        if !row.visible_n[n].is_empty() {
-            // What is common to the two follows from what the agent sees, but only if it sees the other.
-            let kept = if seen.contains(other) {
-                seen
-            } else {
-                EntitySet::EMPTY
-            };
-            let beyond = (0..spec.entities)
-                .map(EntityId::new)
-                .filter(|_| noise.uniform() < 0.5);
-            let beyond = beyond.collect::<EntitySet>().difference(kept);
-            row.visible_n[n] = row.visible_n[n].intersection(kept).union(beyond);
-            row.visible_n[n].insert(other);
-        }
-    }
-}
-
-/// Numbers that have nothing to do with the game.
-struct Noise {
-    key: EpisodeKey,
-    step: usize,
-    draws: usize,
-}
-
-impl Noise {
-    fn uniform(&mut self) -> f64 {
-        self.draws += 1;
-        self.key.uniform(self.step, Draw::World(self.draws))
-    }
-
-    /// Fills with numbers in [0, 32), the range of positions.
-    #[expect(clippy::cast_possible_truncation, reason = "noise may be rounded")]
-    fn fill(&mut self, values: &mut [f32]) {
-        values.fill_with(|| (32.0 * self.uniform()) as f32);
-    }
-}
-
-fn part<T>(all: &mut [T], index: usize, len: usize) -> &mut [T] {
-    &mut all[index * len..(index + 1) * len]
 }

@@ -1,16 +1,14 @@
 //! What passes between the one who certifies and an agent in another process: the agent's own local views, and its actions.
 
-use std::{
-    hash::{DefaultHasher, Hash, Hasher},
-    io::{BufRead, Write},
-};
+use std::io::{BufRead, Write};
 
 use mackrl_env::{Action, AgentId, EntityId, EntitySet, EpisodeKey, KnownEntities, LocalView};
 use serde::{Deserialize, Serialize};
 
+use super::computed::{Computed, Fingerprints};
 use crate::{
     Error,
-    policy::{Behaviour, ControllerId, ControllerInput, Executor, Parameters},
+    policy::{Behaviour, ControllerInput, Executor, Parameters},
 };
 
 /// What an agent is told.
@@ -19,7 +17,7 @@ use crate::{
 pub enum Request {
     /// A new episode begins.
     Begin {
-        /// Its name, from which shared and private draws follow.
+        /// The key of its choices, from which shared and private draws follow; it is not the world's.
         key: EpisodeKey,
         /// How to choose.
         behaviour: Behaviour,
@@ -39,12 +37,14 @@ pub enum Request {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Answer {
-    /// Its action, and fingerprints of what its controllers read.
+    /// Its action, and fingerprints of what the controllers of its groups read and gave.
     Action {
         /// What it does.
         action: Action,
         /// A fingerprint of each controller's input.
-        fingerprints: Vec<(ControllerId, u64)>,
+        inputs: Fingerprints,
+        /// A fingerprint of the log-probabilities of each controller that was asked.
+        outputs: Fingerprints,
     },
     /// What its controllers read.
     Inputs(Vec<ControllerInput>),
@@ -147,19 +147,6 @@ impl ReceivedView {
     }
 }
 
-/// Fingerprints of controllers' inputs, bit for bit.
-pub(super) fn fingerprints(inputs: &[ControllerInput]) -> Vec<(ControllerId, u64)> {
-    let fingerprint = |input: &ControllerInput| {
-        let mut hasher = DefaultHasher::new();
-        input
-            .values
-            .iter()
-            .for_each(|value| value.to_bits().hash(&mut hasher));
-        (input.controller.clone(), hasher.finish())
-    };
-    inputs.iter().map(fingerprint).collect()
-}
-
 /// Lives as one agent: answers the requests that arrive as lines of JSON until there are no more.
 ///
 /// # Errors
@@ -208,10 +195,16 @@ pub(super) fn answer(
             };
             let received = view.receive()?;
             let action = executor.act(parameters, received.view(), key, step, *behaviour);
-            let fingerprints = fingerprints(&executor.controller_inputs());
+            let (inputs, outputs) = (executor.controller_inputs(), executor.controller_outputs());
+            let Computed {
+                action,
+                inputs,
+                outputs,
+            } = Computed::of(received.view().agent(), action, &inputs, &outputs);
             Ok(Some(Answer::Action {
                 action,
-                fingerprints,
+                inputs,
+                outputs,
             }))
         }
         Request::Explain => Ok(Some(Answer::Inputs(executor.controller_inputs()))),

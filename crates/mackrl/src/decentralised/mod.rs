@@ -4,14 +4,20 @@
 //! local views, and nothing else. [`Subject::certify`] plays whole episodes with N executors beside the central run and compares
 //! every action, and plays the central run again in worlds where everything that an agent does not see is different.
 
+mod alteration;
+mod central;
 mod certificate;
+mod computed;
 mod message;
+mod report;
 
 use mackrl_env::EpisodeKey;
 
 pub use self::{
-    certificate::{AgentLink, Certificate, Check, CounterExample, DifferingInput, Subject},
+    certificate::{AgentLink, Repetition, Subject},
+    computed::{Difference, Fingerprints},
     message::{Answer, ReceivedView, Request, ViewMessage, serve_agent},
+    report::{Certificate, Check, CounterExample, DifferingInput, Isolation},
 };
 use crate::{
     Error,

@@ -16,7 +16,10 @@ use crate::{
     NotFinite, Phase, Stopwatch,
     experience::Experience,
     marginalisation::{MarginalGradient, log_likelihood_with_gradient},
-    policy::{Actor, ControllerInput, Parameters, Recording, Sampler, Situation, Tally, Thought},
+    policy::{
+        Actor, ControllerInput, ControllerOutput, Parameters, PolicyTable, Recording, Sampler,
+        Situation, Tally, Thought,
+    },
 };
 
 /// A team that acts as its hierarchy declares.
@@ -149,6 +152,16 @@ impl Actor for TeamActor {
 
     fn controller_inputs(&self, experience: &Experience, b: usize) -> Vec<ControllerInput> {
         self.controllers.inputs(experience, b)
+    }
+
+    fn controller_outputs(&self, experience: &Experience, b: usize) -> Vec<ControllerOutput> {
+        self.controllers.outputs(experience, b)
+    }
+
+    fn table(&mut self, b: usize, situation: Situation<'_>) -> Option<PolicyTable<'_, f32>> {
+        let Controllers { parts, tables, .. } = &mut self.controllers;
+        let decision = tables[b].decision(parts, &situation.keys[b], situation.step);
+        Some(decision.table)
     }
 
     fn thought(&mut self, b: usize, situation: Situation<'_>, action_n: &[Action]) -> Thought {

@@ -9,7 +9,7 @@ use crate::{
     experience::Rows,
     hierarchy::{HierarchySettings, NetworkStyle},
     nn::{NetworkSizes, ParameterLayout, RecurrentNetwork, normalise_rows},
-    policy::{Delegation, Level, Memory, Reads},
+    policy::{ControllerDescription, Delegation, Level, Memory, Reads},
 };
 
 /// The network of a level and the encoding of its inputs.
@@ -61,6 +61,37 @@ impl Bank {
             encoder,
             agents: spec.agents,
             observation_size: spec.observation_size,
+        }
+    }
+
+    /// What the network of `level` is made of.
+    pub(crate) fn describe(&self, level: &Level) -> ControllerDescription {
+        let NetworkSizes {
+            inputs,
+            hidden,
+            outputs,
+        } = self.network.sizes();
+        let members = ("members", level.size() * self.agents);
+        let encoded = self.encoder.as_ref().map(GroupEncoder::parts);
+        let mut parts = encoded.unwrap_or_default();
+        match level.reads {
+            Reads::CommonKnowledge => {}
+            Reads::CommonKnowledgeAndMembers => parts.push(members),
+            Reads::OwnObservation => {
+                let last_action = inputs - self.observation_size - self.agents;
+                parts.push(("observation", self.observation_size));
+                parts.push(members);
+                parts.push(("last_action", last_action));
+            }
+        }
+        ControllerDescription {
+            name: level.name,
+            groups: level.groups.clone(),
+            inputs: parts,
+            hidden,
+            divisions: level.divisions,
+            joint_actions: outputs - level.divisions,
+            explores: level.explores,
         }
     }
 

@@ -19,7 +19,10 @@ use crate::{
     NotFinite, Phase, Stopwatch,
     experience::{Experience, Instance, Rows, StepRows},
     nn::first_not_finite,
-    policy::{ControllerId, ControllerInput, Memory, Parameters, Part, Reads, Recording, TEAM},
+    policy::{
+        ControllerId, ControllerInput, ControllerOutput, Level, Memory, Parameters, Part, Reads,
+        Recording, TEAM,
+    },
 };
 
 /// The controllers of a few environments, or of one agent.
@@ -208,15 +211,43 @@ impl Controllers {
                 rows_of_environment(rows.instances_of(rows.latest()), b).map(move |row| {
                     let instance = rows.instances_of(rows.latest())[row];
                     ControllerInput {
-                        controller: ControllerId {
-                            name: level.name.into(),
-                            agents: level.groups[instance.group].clone(),
-                        },
+                        controller: controller_id(level, instance.group),
                         values: rows.input(row).to_vec(),
                     }
                 })
             })
             .collect()
+    }
+
+    /// What the controllers of environment `b` that were asked at the latest step gave.
+    pub(crate) fn outputs(&self, experience: &Experience, b: usize) -> Vec<ControllerOutput> {
+        let levels = self.parts.declaration.levels().iter().enumerate();
+        let mut outputs = Vec::new();
+        for (place, level) in levels {
+            let Some(own) = &self.activations.banks[place] else {
+                continue;
+            };
+            let rows = &experience.banks[place];
+            let step = rows.latest();
+            for (asked, &row) in rows.asked_of(step).iter().enumerate() {
+                let instance = rows.instances_of(step)[row];
+                if instance.environment == b {
+                    outputs.push(ControllerOutput {
+                        controller: controller_id(level, instance.group),
+                        log_p: own.log_p(step.asked.start + asked).to_vec(),
+                    });
+                }
+            }
+        }
+        outputs
+    }
+}
+
+/// Names the controller of a group.
+fn controller_id(level: &Level, group: usize) -> ControllerId {
+    ControllerId {
+        name: level.name.into(),
+        agents: level.groups[group].clone(),
     }
 }
 

@@ -17,7 +17,9 @@ use super::{
 use crate::{
     Stopwatch,
     experience::Experience,
-    policy::{Behaviour, ControllerInput, Executor, Parameters, Recording, Sampler},
+    policy::{
+        Behaviour, ControllerInput, ControllerOutput, Executor, Parameters, Recording, Sampler,
+    },
 };
 
 /// Executes one agent of a hierarchy.
@@ -101,6 +103,14 @@ impl Executor for AgentExecutor {
     fn controller_inputs(&self) -> Vec<ControllerInput> {
         if self.ran {
             self.controllers.inputs(&self.experience, 0)
+        } else {
+            Vec::new()
+        }
+    }
+
+    fn controller_outputs(&self) -> Vec<ControllerOutput> {
+        if self.ran {
+            self.controllers.outputs(&self.experience, 0)
         } else {
             Vec::new()
         }

@@ -40,7 +40,7 @@ use self::{actor::TeamActor, bank::Bank, executor::AgentExecutor};
 use crate::{
     common_knowledge::CommonKnowledgeFeatures,
     nn::{ParameterLayout, RecurrentWeights},
-    policy::{Actor, Declaration, Executor, Parameters, Policy},
+    policy::{Actor, ControllerDescription, Declaration, Executor, Parameters, Part, Policy, TEAM},
 };
 
 /// What the controllers of a hierarchy are made of.
@@ -158,6 +158,23 @@ impl Policy for Hierarchy {
         &self.parts.layout
     }
 
+    fn description(&self) -> Vec<ControllerDescription> {
+        let levels = self.parts.declaration.levels().iter();
+        let banks = levels.zip(&self.parts.banks);
+        let learned = banks.filter_map(|(level, bank)| Some((level, bank.as_ref()?)));
+        learned.map(|(level, bank)| bank.describe(level)).collect()
+    }
+
+    fn partitions(&self) -> Vec<Vec<Vec<AgentId>>> {
+        let declaration = &self.parts.declaration;
+        let divisions = declaration.levels()[TEAM].divisions_gd.first();
+        let members = |part: &Part| declaration.members(*part).to_vec();
+        let divided = divisions.into_iter().flatten();
+        divided
+            .map(|division| division.parts.iter().map(members).collect())
+            .collect()
+    }
+
     fn initialise(&self, seed: u64) -> Vec<f32> {
         let key = EpisodeKey::new(seed, Stream::Other, 0);
         let mut parameters = vec![0.0; self.parts.layout.len()];
@@ -190,5 +207,11 @@ impl Policy for Hierarchy {
 
     fn executor(&self, agent: AgentId) -> Box<dyn Executor> {
         Box::new(AgentExecutor::new(Arc::clone(&self.parts), agent))
+    }
+
+    fn draws_when_greedy(&self) -> bool {
+        let declaration = &self.parts.declaration;
+        let mut levels = declaration.levels().iter();
+        !declaration.is_fixed() || levels.any(|level| level.divisions > 1 && !level.is_learned())
     }
 }

@@ -102,6 +102,18 @@ pub trait Policy: Send + Sync + Debug {
     /// Names and shapes of the parameters.
     fn layout(&self) -> &ParameterLayout;
 
+    /// What the networks are made of and what they read, for those who compute with the weights alone; nothing, for a policy
+    /// without networks.
+    fn description(&self) -> Vec<ControllerDescription> {
+        Vec::new()
+    }
+
+    /// The partitions that a team chooses from \[P\]\[groups\]\[members\], in the order of the selector's columns; nothing, where
+    /// they change from step to step or there is no choice.
+    fn partitions(&self) -> Vec<Vec<Vec<AgentId>>> {
+        Vec::new()
+    }
+
     /// Random initial parameters, a function of `seed`.
     fn initialise(&self, seed: u64) -> Vec<f32>;
 
@@ -110,6 +122,12 @@ pub trait Policy: Send + Sync + Debug {
 
     /// Working memory for `agent` alone.
     fn executor(&self, agent: AgentId) -> Box<dyn Executor>;
+
+    /// Whether the key of an episode decides anything in greedy play, such as which partition is in force. If it does not, another
+    /// key has to lead to the same actions, which the certificate checks.
+    fn draws_when_greedy(&self) -> bool {
+        true
+    }
 }
 
 /// Plays a team in several environments at once.
@@ -150,6 +168,20 @@ pub trait Actor: Send {
     /// What the controllers of environment `b` read at the latest step.
     fn controller_inputs(&self, experience: &Experience, b: usize) -> Vec<ControllerInput>;
 
+    /// The log-probabilities that the controllers of environment `b` gave at the latest step, of those that were asked. Nothing,
+    /// for actors that keep none.
+    fn controller_outputs(&self, experience: &Experience, b: usize) -> Vec<ControllerOutput> {
+        let _ = (experience, b);
+        Vec::new()
+    }
+
+    /// All log-probabilities of environment `b` at the latest step, which was `situation`; nothing, for actors without a
+    /// hierarchy.
+    fn table(&mut self, b: usize, situation: Situation<'_>) -> Option<PolicyTable<'_, f32>> {
+        let _ = (b, situation);
+        None
+    }
+
     /// What the controllers of environment `b` computed at the latest step, which was `situation` and led to `action_n` \[N\].
     /// Nothing, for actors that have no controllers to look into.
     fn thought(&mut self, b: usize, situation: Situation<'_>, action_n: &[Action]) -> Thought {
@@ -176,6 +208,30 @@ pub trait Executor: Send {
 
     /// What this agent's controllers read at the latest step.
     fn controller_inputs(&self) -> Vec<ControllerInput>;
+
+    /// The log-probabilities that this agent's controllers gave at the latest step; as [`Actor::controller_outputs`].
+    fn controller_outputs(&self) -> Vec<ControllerOutput> {
+        Vec::new()
+    }
+}
+
+/// The network that the controllers of one level share: Linear and `ReLU`, a gated recurrent unit, Linear, masked log-softmax.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ControllerDescription {
+    /// As the tensors of its network begin: `pair_controller`.
+    pub name: &'static str,
+    /// The members of each group \[G\]\[members\].
+    pub groups: Vec<Vec<AgentId>>,
+    /// What stands in a row of inputs, one behind the other, and how many numbers each has.
+    pub inputs: Vec<(&'static str, usize)>,
+    /// H: units of the first layer and of the recurrent unit.
+    pub hidden: usize,
+    /// Ways to divide: the first columns of a row of outputs.
+    pub divisions: usize,
+    /// Joint actions, which follow them: of members (i, j) column i·A + j.
+    pub joint_actions: usize,
+    /// Whether exploration is mixed into its choices.
+    pub explores: bool,
 }
 
 /// Names one controller: its level's name, and whose it is.
@@ -195,4 +251,13 @@ pub struct ControllerInput {
     pub controller: ControllerId,
     /// The numbers, in the order of the controller's encoding.
     pub values: Vec<f32>,
+}
+
+/// What one controller gave at one step.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ControllerOutput {
+    /// Whose output.
+    pub controller: ControllerId,
+    /// The logarithms of the probabilities of its choices \[C\].
+    pub log_p: Vec<f32>,
 }

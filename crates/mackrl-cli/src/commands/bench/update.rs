@@ -6,10 +6,12 @@ use mackrl::nn::{InstructionSet, NetworkSizes, benchmark::UpdateProbe};
 use serde::Serialize;
 
 use super::print_rows;
-use crate::{args::BenchUpdateArgs, output};
+use crate::{args::BenchUpdateArgs, failure::Failure, output};
 
 /// Updates that are not timed: they touch the memory for the first time.
 const WARM_UP: usize = 3;
+/// Most rows times steps: what they need fits into the memory of small machines.
+const ENTRIES_MOST: usize = 200_000;
 
 #[derive(Debug, Serialize)]
 struct UpdateSpeed {
@@ -29,6 +31,12 @@ struct UpdateSpeed {
 }
 
 pub(super) fn run(args: &BenchUpdateArgs) -> anyhow::Result<()> {
+    let most = ENTRIES_MOST / args.rows.get();
+    if args.steps.get() > most {
+        let (rows, steps) = (args.rows, args.steps);
+        let message = format!("--steps {steps} with --rows {rows}: expected at most {most}");
+        return Err(Failure::usage(message).into());
+    }
     let speed = measure(args, InstructionSet::chosen()?);
     if args.json {
         return output::print_json(&speed);

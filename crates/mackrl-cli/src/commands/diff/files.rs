@@ -5,7 +5,8 @@ use std::path::Path;
 use anyhow::Context;
 use mackrl_run::{
     bounded,
-    training::{Difference, compare_tensors},
+    run_folder::read_checkpoint,
+    training::{Checkpoint, Difference, compare_tensors},
 };
 use serde::Serialize;
 use serde_json::Value;
@@ -15,8 +16,6 @@ use crate::failure::Failure;
 
 /// Greatest length of a JSON file.
 const JSON_MAX: usize = 1 << 28;
-/// Greatest length of a checkpoint's tensors.
-const TENSORS_MAX: usize = 1 << 32;
 
 /// Two JSON files.
 #[derive(Debug, Serialize)]
@@ -56,10 +55,9 @@ pub(super) fn compare_json(a: &Path, b: &Path) -> anyhow::Result<JsonFiles> {
 
 /// Compares two checkpoints.
 pub(super) fn compare_checkpoints(a: &Path, b: &Path) -> anyhow::Result<Checkpoints> {
-    let counters = |folder: &Path| read(&folder.join("counters.json"));
-    let tensors = |folder: &Path| bounded::read(&folder.join("tensors.safetensors"), TENSORS_MAX);
-    let counters = first_difference("", &counters(a)?, &counters(b)?);
-    let tensors = compare_tensors(&tensors(a)?, &tensors(b)?)
+    let [own, other] = [read_checkpoint(a)?, read_checkpoint(b)?];
+    let counters = first_difference("", &counters(a, &own)?, &counters(b, &other)?);
+    let tensors = compare_tensors(&own.tensors, &other.tensors)
         .with_context(|| format!("cannot compare {} with {}", a.display(), b.display()))?;
     Ok(Checkpoints {
         equal: counters.is_none() && tensors.is_none(),
@@ -68,8 +66,16 @@ pub(super) fn compare_checkpoints(a: &Path, b: &Path) -> anyhow::Result<Checkpoi
     })
 }
 
+fn counters(path: &Path, checkpoint: &Checkpoint) -> anyhow::Result<Value> {
+    parse(path, &checkpoint.counters)
+}
+
 fn read(path: &Path) -> anyhow::Result<Value> {
-    serde_json::from_slice(&bounded::read(path, JSON_MAX)?).map_err(|error| {
+    parse(path, &bounded::read(path, JSON_MAX)?)
+}
+
+fn parse(path: &Path, json: &[u8]) -> anyhow::Result<Value> {
+    serde_json::from_slice(json).map_err(|error| {
         let message = format!("{}: {error}", path.display());
         Failure::BadData { message }.into()
     })

@@ -128,7 +128,14 @@ impl fmt::Display for Card {
             ("enemies", groups_in_words(&self.enemies) + "; " + &order),
             (
                 "n_actions",
-                format!("{} = 6 + {} for targets", row.n_actions, row.n_enemies),
+                format!("{} = 6 + {} for targets", row.n_actions, row.n_actions - 6),
+            ),
+            (
+                "type_bits",
+                match row.unit_type_bits {
+                    0 => "0, because each side is of one type".to_owned(),
+                    bits => format!("{bits}, one for each type on either side"),
+                },
             ),
             (
                 "obs_size",

@@ -17,7 +17,7 @@ pub(super) struct Row {
     pub(super) episode_limit: usize,
     shield_bits_ally: usize,
     shield_bits_enemy: usize,
-    unit_type_bits: usize,
+    pub(super) unit_type_bits: usize,
     /// SMAC's word for the team; `null` for a scenario that has none.
     map_type: Option<&'static str>,
     pub(super) n_actions: usize,

@@ -17,7 +17,7 @@ use crate::{
     failure::Failure,
     output,
     progress::Meter,
-    replay::{Opened, Summary, picture},
+    replay::{Opened, picture},
 };
 
 /// The word that stands for every map.
@@ -60,7 +60,7 @@ fn one(args: &PlayArgs, replay: Replay) -> anyhow::Result<()> {
         let step = opened.check_step(args.step.unwrap_or(opened.playback.steps() / 2))?;
         output::write_file(file, picture(&opened, step, &[]).to_svg().as_bytes())?;
     }
-    let summary = Summary::of(&opened);
+    let summary = opened.summary();
     if args.json {
         output::print_json(&summary)
     } else {

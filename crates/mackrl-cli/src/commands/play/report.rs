@@ -52,7 +52,7 @@ impl<'a> Report<'a> {
         format!(
             "# How scripted teams fare\n\n\
              Means over episodes, each ± its standard error. Every script decides from the agents' own local views;\n\
-             `crates/mackrl-env/src/skirmish/scripted/mod.rs` says how. An error of 0 means that all episodes ended alike, which they may\n\
+             `crates/mackrl-skirmish/src/scripted/mod.rs` says how. An error of 0 means that all episodes ended alike, which they may\n\
              not always do: of n such episodes, up to 3/n could have gone otherwise (with 95 % confidence).\n\n\
              [`{DATA}`]({DATA}) holds all numbers: episode lengths and losses of either side too. Version {code} made both files by\n\n\
              ```text\n{command}\n```\n\n\

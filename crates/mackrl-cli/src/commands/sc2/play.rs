@@ -47,7 +47,7 @@ pub(crate) fn play_one(
             "timed_out": timed_out,
         }));
     }
-    let outcome = output::outcome(battle_won, timed_out);
+    let outcome = mackrl_run::replay::outcome_in_words(battle_won, timed_out);
     output::print(&format!(
         "played: {} on StarCraft II by {}, {outcome} after {steps} steps, allies lost: {dead_allies}, enemies lost: {dead_enemies}\n",
         map.map(),

@@ -1,7 +1,9 @@
 //! From a picture to the shapes that are drawn.
 
+use mackrl_run::replay::Shot;
+
 use super::{
-    BattlePicture, FAINT, Figure, INK, Link, PAPER, Shot, Side,
+    BattlePicture, FAINT, Figure, INK, Link, PAPER, Side,
     ground::{WALL, Window},
     legend, lens,
     marks::{bars, body, circle, closed, cross, filled, link, name_tag, open, words},

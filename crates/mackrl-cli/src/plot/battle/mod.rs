@@ -10,6 +10,8 @@ mod legend;
 mod lens;
 mod marks;
 
+use mackrl_run::replay::Shot;
+
 use super::{chart::Colour, svg};
 use drawing::Drawing;
 
@@ -89,17 +91,6 @@ pub(crate) struct Figure {
     pub(crate) life: f64,
     /// Share of its shields, if its type has any.
     pub(crate) shield: Option<f64>,
-}
-
-/// A unit that aims at another.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Shot {
-    /// Index of the attacker among the figures.
-    pub(crate) from: usize,
-    /// Index of the target.
-    pub(crate) to: usize,
-    /// Whether it attacked in this step; otherwise it only aims.
-    pub(crate) has_fired: bool,
 }
 
 impl Side {

@@ -1,3 +1,4 @@
+use mackrl_run::replay::Shot;
 use tiny_skia::Pixmap;
 
 use super::*;

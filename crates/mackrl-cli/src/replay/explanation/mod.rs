@@ -4,10 +4,10 @@ mod text;
 
 use mackrl::policy::{GroupChoice, PairThought, Thought};
 use mackrl_env::{Action, AgentId, EntityId, EntitySet};
-use mackrl_run::replay::GroupKnowledge;
+use mackrl_run::replay::{GroupKnowledge, Summary};
 use serde::Serialize;
 
-use super::{Opened, Summary};
+use super::Opened;
 
 /// The facts of one step.
 #[derive(Debug, Serialize)]
@@ -124,7 +124,7 @@ impl Explanation {
         let thought = recorded.and_then(|step| step.thought.as_ref());
         let entities = opened.playback.moments[step].state.units.len();
         Self {
-            episode: Summary::of(opened),
+            episode: opened.summary(),
             step,
             value: recorded.and_then(|step| step.value),
             reward: opened.playback.reward_t.get(step).copied(),

@@ -1,7 +1,7 @@
 //! The report as one HTML page that needs no other file.
 
 use super::Claim;
-use crate::reproduce::ClaimSource;
+use crate::{output::escaped, reproduce::ClaimSource};
 use mackrl_run::provenance::CODE;
 
 const STYLE: &str = include_str!("page.css");
@@ -95,21 +95,6 @@ fn badge(claim: &Claim) -> &'static str {
     } else {
         "<b class=\"fails\">does not hold</b>"
     }
-}
-
-/// Text that stays text wherever it stands in a page.
-fn escaped(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            other => escaped.push(other),
-        }
-    }
-    escaped
 }
 
 #[cfg(test)]

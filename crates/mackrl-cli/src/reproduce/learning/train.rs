@@ -11,7 +11,12 @@ use mackrl_run::{
 };
 
 use super::{Cell, LearningOptions};
-use crate::{commands::resume::make_all, failure::Failure, reproduce::write, signals};
+use crate::{
+    commands::{resume::make_all, sweep::expect_all},
+    failure::Failure,
+    reproduce::write,
+    signals,
+};
 
 /// A run to be made.
 pub(super) struct Job<'a> {
@@ -39,14 +44,7 @@ pub(super) fn train_all(
         .map(|&job| jobs[job].entry(options))
         .collect::<anyhow::Result<_>>()?;
     let outcome = make_all(&entries, options.jobs(), &signals::listen()?)?;
-    if let Some((name, reason)) = outcome.failed.first() {
-        let message = format!(
-            "{} of {} runs failed, the first of them {name}: {reason}",
-            outcome.failed.len(),
-            entries.len()
-        );
-        return Err(Failure::BadData { message }.into());
-    }
+    expect_all(&outcome, entries.len())?;
     for (job, entry) in missing.into_iter().zip(&entries) {
         runs[job] = Some(jobs[job].keep(entry, options)?);
     }

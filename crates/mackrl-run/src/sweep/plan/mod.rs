@@ -2,7 +2,8 @@
 //!
 //! A plan names maps, algorithms and seeds, and every combination of them is a run. `[settings]` holds for all runs; each list in
 //! `[vary]` multiplies them; each table in `[variants]` is a kind of run with settings of its own. Files may come from anybody:
-//! length and number of runs are bounded, names cannot lead out of the sweep's folder, and nothing is run but this program.
+//! length and number of runs are bounded, names of runs cannot lead out of the sweep's folder, and nothing is run but this
+//! program. The sweep's folder itself, `out`, may be any path: read it, or give `--out`, before making a stranger's plan.
 
 use std::{
     collections::{BTreeMap, BTreeSet},

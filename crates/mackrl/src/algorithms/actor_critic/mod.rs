@@ -35,10 +35,7 @@ const METRICS: &[(&str, &str)] = &[
         "agent_grad_norm",
         "norm of the policy's gradient before clipping",
     ),
-    (
-        "advantage_mean",
-        "mean of A_t = r_t + γ V(s_{t+1}) − V(s_t)",
-    ),
+    ("advantage_mean", "mean of the advantages A_t"),
     (
         "critic_loss",
         "mean squared error of V to its λ-returns over a sweep",
@@ -92,6 +89,7 @@ const METRICS: &[(&str, &str)] = &[
 pub struct ActorCritic {
     settings: ActorCriticSettings,
     agents: usize,
+    episode_limit: usize,
     threads: usize,
     hierarchy: Hierarchy,
     parameters: Parameters,
@@ -118,8 +116,9 @@ impl ActorCritic {
         let critic_key = EpisodeKey::new(team.seed, Stream::Other, 1);
         Self {
             agents: team.spec.agents,
+            episode_limit: team.spec.episode_limit,
             threads: team.threads,
-            optimiser: Optimiser::new(settings.optimiser.into(), parameters.len()),
+            optimiser: Optimiser::new(settings.optimiser(), parameters.len()),
             critic: CentralCritic::new(team.spec.state_size, settings.critic(), &critic_key),
             parameters: Parameters::new(parameters),
             hierarchy,
@@ -156,7 +155,9 @@ impl ActorCritic {
     /// [`LossAverage`](crate::objectives::LossAverage), `1 / Σ_b T_b` unless something else is asked for.
     fn policy_step(&mut self, batch: &mut [&mut Piece]) -> Result<f64, Error> {
         let steps_b: Vec<usize> = self.advantage_bt.iter().map(Vec::len).collect();
-        let weights = self.settings.loss_average.weight_t(&steps_b).into_iter();
+        let weights = (self.settings.loss_average)
+            .weight_t(&steps_b, self.episode_limit)
+            .into_iter();
         let weight_t: Vec<f32> = weights.map(|weight| weight / self.agents as f32).collect();
         let parameters = self.parameters.values().len();
         self.gradients
@@ -263,7 +264,7 @@ impl Algorithm for ActorCritic {
         if steps == 0 {
             return Err(Error::Data("there is no step to learn from".to_owned()));
         }
-        let critic = self.critic.sweep(&episodes, &mut self.advantage_bt)?;
+        let critic = self.critic.learn(&episodes, &mut self.advantage_bt)?;
         check_advantages(&self.advantage_bt)?;
         stopwatch.lap(Phase::Critic);
         let exploration = batch
@@ -308,7 +309,7 @@ impl Algorithm for ActorCritic {
 
     fn state(&self) -> AlgorithmState {
         let (layout, critic_layout) = (self.hierarchy.layout(), self.critic.layout());
-        let (kind, critic) = (self.settings.optimiser.into(), self.critic.state());
+        let (kind, critic) = (self.settings.optimiser(), self.critic.state());
         let mut state = AlgorithmState::default();
         state.add_tensors(layout, self.parameters.values());
         state.add_tensors(critic_layout, &critic.parameters);
@@ -326,7 +327,7 @@ impl Algorithm for ActorCritic {
 
     fn restore(&mut self, stored: &dyn StoredState) -> Result<(), Error> {
         let (layout, critic_layout) = (self.hierarchy.layout(), self.critic.layout());
-        let kind = self.settings.optimiser.into();
+        let kind = self.settings.optimiser();
         let parameters = stored.tensors(layout)?;
         let moments = read_moments(stored, "policy", kind, layout)?;
         let updates = stored.counter("policy.updates")?;

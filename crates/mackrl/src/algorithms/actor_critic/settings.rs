@@ -6,7 +6,7 @@ use mackrl_env::{
 };
 
 use crate::{
-    critics::CriticSettings,
+    critics::{CriticMinibatch, CriticSettings},
     nn::OptimiserKind,
     objectives::{LossAverage, ReturnSettings},
 };
@@ -19,15 +19,6 @@ declare_words! {
         Adam = "adam",
         /// `RMSprop`, as the authors' code.
         Rmsprop = "rmsprop",
-    }
-}
-
-impl From<OptimiserName> for OptimiserKind {
-    fn from(name: OptimiserName) -> Self {
-        match name {
-            OptimiserName::Adam => Self::ADAM,
-            OptimiserName::Rmsprop => Self::RMSPROP,
-        }
     }
 }
 
@@ -45,6 +36,11 @@ declare_settings! {
         exploration_steps_env: u64 = 50_000, Accepts::integer(1, EXACT);
         /// How parameters follow the gradient, for the controllers and for the critic.
         optimiser: OptimiserName = OptimiserName::Adam, OptimiserName::ACCEPTS;
+        /// What is added to the root of the mean squared gradient before a step is divided by it: a parameter whose gradients have long
+        /// been smaller than this moves less than the step size.
+        optimiser_epsilon: f64 = 1e-8, Accepts::above_within(0.0, 1.0);
+        /// Of `rmsprop`: how much of the mean squared gradient is kept at a step. The larger, the longer its memory.
+        rmsprop_smoothing: f64 = 0.99, Accepts::within(0.0, 0.999_999);
         /// Step size of the controllers.
         learning_rate: f64 = 5e-4, Accepts::above_within(0.0, 1.0);
         /// Step size of the critic.
@@ -53,12 +49,21 @@ declare_settings! {
         gamma: f64 = 0.99, Accepts::within(0.0, 1.0);
         /// λ of the critic's TD(λ) targets: 0 looks one step ahead, 1 to the end of the episode.
         lambda: f64 = 0.8, Accepts::within(0.0, 1.0);
+        /// The states on which the critic takes one optimiser step: those of one time, from the last time to the first, or all of the
+        /// batch.
+        critic_minibatch: CriticMinibatch = CriticMinibatch::Time, CriticMinibatch::ACCEPTS;
+        /// How often the critic goes through a batch before the policy learns from it. The authors' configurations ask for 60 (3m: 40)
+        /// repetitions, and their released code has the loop commented out.
+        critic_sweeps: u64 = 1, Accepts::integer(1, 1000);
+        /// λ of the advantages: 0 looks one step ahead, as the paper does (eq. 6); above it, they are generalised advantages (GAE).
+        advantage_lambda: f64 = 0.0, Accepts::within(0.0, 1.0);
         /// Critic updates between two refreshments of the target critic.
         target_interval_updates: u64 = 200, Accepts::integer(1, EXACT);
         /// Longest gradient (Euclidean norm over all parameters of the policy, or of the critic); longer ones are shortened.
         gradient_norm_max: f64 = 10.0, Accepts::above(0.0);
         /// What a step counts for in the policy's loss: all steps of a batch alike, or, as in the authors' code, those of each time
-        /// slot together as much as those of another, so that late steps of long episodes count for more.
+        /// slot together as much as those of another, so that late steps of long episodes count for more; a buffer has one slot more
+        /// than the time limit, so that batches of short episodes count for less.
         loss_average: LossAverage = LossAverage::Steps, LossAverage::ACCEPTS;
         /// Weight τ of the entropy of the joint action beside the return; 0 is the paper's objective (eq. 6). Advantages are of the
         /// size of rewards, so that useful weights are small: .001 and less.
@@ -74,18 +79,37 @@ declare_settings! {
 }
 
 impl ActorCriticSettings {
+    /// How parameters follow the gradient.
+    #[must_use]
+    pub const fn optimiser(&self) -> OptimiserKind {
+        match self.optimiser {
+            OptimiserName::Adam => OptimiserKind::Adam {
+                beta1: 0.9,
+                beta2: 0.999,
+                epsilon: self.optimiser_epsilon,
+            },
+            OptimiserName::Rmsprop => OptimiserKind::RmsProp {
+                smoothing: self.rmsprop_smoothing,
+                epsilon: self.optimiser_epsilon,
+            },
+        }
+    }
+
     /// How the critic learns.
     #[must_use]
     pub fn critic(&self) -> CriticSettings {
         CriticSettings {
             hidden: self.hidden,
-            optimiser: self.optimiser.into(),
+            optimiser: self.optimiser(),
             learning_rate: self.critic_learning_rate,
             gradient_norm_max: self.gradient_norm_max,
             returns: ReturnSettings {
                 gamma: self.gamma,
                 lambda: self.lambda,
             },
+            minibatch: self.critic_minibatch,
+            sweeps: self.critic_sweeps,
+            advantage_lambda: self.advantage_lambda,
             target_interval_updates: self.target_interval_updates,
             bootstrap_at_time_limit: self.bootstrap_at_time_limit,
         }
@@ -141,6 +165,22 @@ mod tests {
             let found = settings.exploration(steps);
             assert!((found - expected).abs() < 1e-12, "{steps}: {found}");
         }
+    }
+
+    #[test]
+    fn optimisers_have_the_usual_constants_unless_others_are_asked_for() {
+        let of = |text: &str| {
+            let table = toml::from_str(text).unwrap();
+            ActorCriticSettings::read(&table).unwrap().optimiser()
+        };
+        assert_eq!(of(""), OptimiserKind::ADAM);
+        assert_eq!(of("optimiser = \"rmsprop\""), OptimiserKind::RMSPROP);
+        let own = of("optimiser = \"rmsprop\"\noptimiser_epsilon = 1e-5\nrmsprop_smoothing = 0.9");
+        let expected = OptimiserKind::RmsProp {
+            smoothing: 0.9,
+            epsilon: 1e-5,
+        };
+        assert_eq!(own, expected);
     }
 
     #[test]

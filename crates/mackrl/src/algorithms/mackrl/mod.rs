@@ -125,6 +125,10 @@ impl AlgorithmKind for Mackrl {
                 name: "paper-code",
                 text: include_str!("presets/paper-code.toml"),
             },
+            Preset {
+                name: "paper-figures",
+                text: include_str!("presets/paper-figures.toml"),
+            },
         ]
     }
 }

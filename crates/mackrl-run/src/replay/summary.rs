@@ -5,11 +5,11 @@ use std::fmt;
 use mackrl_skirmish::BattleStatistics;
 use serde::Serialize;
 
-use super::Opened;
+use super::{Playback, Replay};
 
 /// How an episode went.
 #[derive(Debug, Serialize)]
-pub(crate) struct Summary {
+pub struct Summary {
     map: String,
     policy: String,
     seed: u64,
@@ -24,12 +24,20 @@ pub(crate) struct Summary {
     state_hash: String,
 }
 
+/// How an episode ended, in words.
+#[must_use]
+pub const fn outcome_in_words(battle_won: bool, timed_out: bool) -> &'static str {
+    match (battle_won, timed_out) {
+        (true, _) => "won",
+        (false, true) => "out of time",
+        (false, false) => "not won",
+    }
+}
+
 impl Summary {
-    /// Of a replay.
-    pub(crate) fn of(opened: &Opened) -> Self {
-        let Opened {
-            replay, playback, ..
-        } = opened;
+    /// Of a replay that was played again.
+    #[must_use]
+    pub fn of(replay: &Replay, playback: &Playback) -> Self {
         let BattleStatistics {
             battle_won,
             dead_allies,
@@ -54,10 +62,11 @@ impl Summary {
 
 impl Summary {
     /// How it ended.
-    pub(super) fn outcome(&self) -> String {
+    #[must_use]
+    pub fn outcome(&self) -> String {
         format!(
             "{} after {} steps, return {:.2}, allies lost: {}, enemies lost: {}",
-            crate::output::outcome(self.battle_won, self.timed_out),
+            outcome_in_words(self.battle_won, self.timed_out),
             self.ep_length,
             self.total,
             self.dead_allies,

@@ -6,10 +6,8 @@
 
 mod data;
 
-use anyhow::Context;
-
-use super::Opened;
-use data::PageData;
+use super::{Playback, Replay};
+use data::{PageData, Shown};
 
 const PAGE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("style.css");
@@ -22,19 +20,18 @@ const SCRIPTS: [&str; 5] = [
     include_str!("player.js"),
 ];
 
-/// The page of a replay, which first shows `step`.
+/// The page of a replay that was played again; it first shows `step`.
 ///
-/// # Errors
-/// If the data cannot be written as JSON.
-pub(crate) fn page(opened: &Opened, step: usize) -> anyhow::Result<String> {
-    let json = serde_json::to_string(&PageData::of(opened, step))
-        .context("cannot write the replay as JSON")?;
+/// # Panics
+/// Never: plain data can be written as JSON, and the template has its marks.
+#[must_use]
+pub fn page(replay: &Replay, playback: &Playback, step: usize) -> String {
+    let shown = Shown::new(replay, playback);
+    let json = serde_json::to_string(&PageData::of(&shown, step)).expect("plain data");
     // Marks are looked for in the template alone, never in what was filled in.
-    let (before_style, rest) = PAGE.split_once("@STYLE@").context("the page has a style")?;
-    let (before_data, rest) = rest.split_once("@DATA@").context("the page has data")?;
-    let (before_script, end) = rest
-        .split_once("@SCRIPT@")
-        .context("the page has a script")?;
+    let (before_style, rest) = PAGE.split_once("@STYLE@").expect("the page has a style");
+    let (before_data, rest) = rest.split_once("@DATA@").expect("the page has data");
+    let (before_script, end) = rest.split_once("@SCRIPT@").expect("the page has a script");
     let script = format!("\"use strict\";\n{}", SCRIPTS.join("\n"));
     let parts = [
         before_style,
@@ -45,7 +42,7 @@ pub(crate) fn page(opened: &Opened, step: usize) -> anyhow::Result<String> {
         script.trim_end(),
         end,
     ];
-    Ok(parts.concat())
+    parts.concat()
 }
 
 /// JSON in which nothing can end the element that it stands in.

@@ -11,13 +11,17 @@ use std::{
 use serde::Serialize;
 
 use crate::{
+    apart::{Apart, PATIENCE},
     config::Config,
     error::{Result, RunError},
     provenance::{Provenance, Versions},
-    run_folder::{Resumption, RunFolder, Status},
+    run_folder::{Completeness, Resumption, RunFolder, Status, StoredRun, latest_row},
     stop_request::StopRequest,
     training::{Checkpoint, MetricRow, Trainer, assembly::RunWorld},
 };
+
+/// Most bytes of a checkpoint that is still written when a stop was asked for: a second or two.
+const QUICKLY_WRITTEN: usize = 256 << 20;
 
 /// How a run stands.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -76,8 +80,20 @@ pub fn train(
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
     RunFolder::check_free(path)?;
-    let trainer = Trainer::in_world(config, world, threads)?;
-    let mut training = Reporting::new(trainer, config, stop);
+    let made = {
+        let (own, world, asked) = (config.clone(), world.clone(), stop.clone());
+        let make = move || -> Result<_> {
+            let trainer = Trainer::in_world(&own, &world, threads)?;
+            Ok(Reporting::new(trainer, &own, &asked))
+        };
+        Apart::start(make, stop)
+    };
+    let Ok(training) = made else {
+        // Nothing is made yet, and the run can go on from there.
+        RunFolder::prepare(path, config, threads)?;
+        return Err(interrupted(path, 0));
+    };
+    let mut training = training?;
     let mut folder = RunFolder::create(path, config, threads)?;
     train_into(&mut folder, &mut training, config, stop, observer)
 }
@@ -94,18 +110,30 @@ pub fn resume(
     stop: &StopRequest,
     observer: &mut dyn Observer,
 ) -> Result<Option<Summary>> {
-    if RunFolder::is_finished(path) {
-        return Ok(None);
+    match StoredRun::open(path)?.completeness()? {
+        Completeness::Finished => return Ok(None),
+        Completeness::WithoutWeights => observer.warn(&format!(
+            "{} was finished, and its weights are lost or damaged since: its last checkpoint gives them again",
+            path.display()
+        )),
+        Completeness::Unfinished => {}
     }
     let Resumption {
         mut folder,
         config,
         checkpoint,
         damaged,
+        metrics_put_aside,
         earlier,
     } = RunFolder::resume(path, threads)?;
     for damage in damaged {
         observer.warn(&format!("{damage}; an earlier one is used"));
+    }
+    if let Some(aside) = metrics_put_aside {
+        observer.warn(&format!(
+            "the metrics are not those of the checkpoint: what is left of them is put aside as {}, and no rows before this point are known any more",
+            aside.display()
+        ));
     }
     if let Some(earlier) = earlier {
         observer.warn(&format!(
@@ -114,23 +142,38 @@ pub fn resume(
         ));
     }
     let world = world(&config)?;
-    let trainer = match checkpoint {
-        Some(checkpoint) => Trainer::resumed(&config, &world, threads, &checkpoint)?,
-        None => Trainer::in_world(&config, &world, threads)?,
+    let made = {
+        let (own, asked) = (config.clone(), stop.clone());
+        let make = move || -> Result<_> {
+            let trainer = match checkpoint {
+                Some(checkpoint) => Trainer::resumed(&own, &world, threads, &checkpoint)?,
+                None => Trainer::in_world(&own, &world, threads)?,
+            };
+            Ok(Reporting::new(trainer, &own, &asked))
+        };
+        Apart::start(make, stop)
     };
-    let mut training = Reporting::new(trainer, &config, stop);
-    train_into(&mut folder, &mut training, &config, stop, observer).map(Some)
+    let Ok(training) = made else {
+        folder.set_status(Status::Interrupted)?;
+        return Err(interrupted(path, latest_row(path).steps_env));
+    };
+    train_into(&mut folder, &mut training?, &config, stop, observer).map(Some)
+}
+
+/// That the run at `path` was asked to stop.
+fn interrupted(path: &Path, steps_env: u64) -> RunError {
+    let folder = path.to_owned();
+    RunError::Interrupted { folder, steps_env }
 }
 
 /// Trains to the end, or until asked to stop.
-fn train_into(
+fn train_into<T: Training>(
     folder: &mut RunFolder,
-    training: &mut impl Training,
+    training: &mut Apart<T>,
     config: &Config,
     stop: &StopRequest,
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
-    observer.begin(&training.standing());
     let outcome = continue_into(folder, training, config, stop, observer);
     observer.end();
     let recorded = folder.set_status(match &outcome {
@@ -144,29 +187,62 @@ fn train_into(
     Ok(summary)
 }
 
-fn continue_into(
+/// A run's checkpoint as it was before an update that may have to be given up.
+struct Snapshot {
+    iterations: u64,
+    checkpoint: Checkpoint,
+}
+
+impl Snapshot {
+    fn of(training: &impl Training) -> Self {
+        Self {
+            iterations: training.iterations(),
+            checkpoint: training.checkpoint(),
+        }
+    }
+
+    /// Writes it, unless that takes too long when a stop was asked for: then the run goes on from the checkpoint before.
+    fn write_in_time(&self, folder: &mut RunFolder) -> Result<()> {
+        let Checkpoint { tensors, counters } = &self.checkpoint;
+        if tensors.len() + counters.len() > QUICKLY_WRITTEN {
+            return Ok(());
+        }
+        folder.write_checkpoint(self.iterations, &self.checkpoint)
+    }
+}
+
+fn continue_into<T: Training>(
     folder: &mut RunFolder,
-    training: &mut impl Training,
+    training: &mut Apart<T>,
     config: &Config,
     stop: &StopRequest,
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
     let start = Instant::now();
-    let steps_env_before = training.standing().steps_env;
+    let mut standing = training.complete(|training| training.standing());
+    observer.begin(&standing);
+    let steps_env_before = standing.steps_env;
     if config.run.tensorboard {
         folder.write_events(steps_env_before)?;
     }
     let interval = config.run.checkpoint_interval_steps_env;
     let mut intervals = steps_env_before / interval;
-    while !training.finished() {
+    let mut snapshot: Option<Snapshot> = None;
+    while !training.complete(|training| training.finished()) {
         if stop.is_made() {
-            folder.write_checkpoint(training.iterations(), &training.checkpoint())?;
-            return Err(RunError::Interrupted {
-                folder: folder.path().to_owned(),
-                steps_env: training.standing().steps_env,
-            });
+            if let Ok(snapshot) = training.ask(stop, |training| Snapshot::of(training)) {
+                snapshot.write_in_time(folder)?;
+            }
+            return Err(interrupted(folder.path(), standing.steps_env));
         }
-        let Update { metrics, standing } = match training.update() {
+        let began = Instant::now();
+        let Ok(update) = training.ask(stop, |training| training.update()) else {
+            if let Some(snapshot) = &snapshot {
+                Snapshot::write_in_time(snapshot, folder)?;
+            }
+            return Err(interrupted(folder.path(), standing.steps_env));
+        };
+        let metrics = match update {
             // What was begun was given up; the checkpoint is that of the moment before.
             Err(mackrl::Error::Stopped) => continue,
             Err(mackrl::Error::NotFinite(number)) => {
@@ -175,7 +251,11 @@ fn continue_into(
                     folder: folder.path().to_owned(),
                 });
             }
-            outcome => outcome?,
+            outcome => {
+                let update = outcome?;
+                standing = update.standing;
+                update.metrics
+            }
         };
         if let Some(metrics) = metrics {
             folder.append_metrics(&metrics)?;
@@ -183,13 +263,25 @@ fn continue_into(
         observer.progress(&standing);
         if standing.steps_env / interval > intervals {
             intervals = standing.steps_env / interval;
-            folder.write_checkpoint(training.iterations(), &training.checkpoint())?;
+            let Snapshot {
+                iterations,
+                checkpoint,
+            } = training.complete(|training| Snapshot::of(training));
+            folder.write_checkpoint(iterations, &checkpoint)?;
         }
+        // The next update may take as long, and have to be given up.
+        snapshot = if began.elapsed() < PATIENCE / 2 {
+            None
+        } else {
+            training.ask(stop, |training| Snapshot::of(training)).ok()
+        };
     }
-    folder.write_checkpoint(training.iterations(), &training.checkpoint())?;
-    folder.write_weights(&training.weights())?;
+    let (last, weights) =
+        training.complete(|training| (Snapshot::of(training), training.weights()));
+    folder.write_checkpoint(last.iterations, &last.checkpoint)?;
+    folder.write_weights(&weights)?;
     let wall_s = start.elapsed().as_secs_f64();
-    let steps_env = training.standing().steps_env;
+    let steps_env = standing.steps_env;
     Ok(Summary {
         folder: folder.path().to_owned(),
         steps_env,
@@ -208,7 +300,7 @@ struct Update {
 }
 
 /// Something that learns from one batch of episodes after the other.
-trait Training {
+trait Training: Send + 'static {
     /// Plays and learns from one batch.
     fn update(&mut self) -> Result<Update, mackrl::Error>;
     /// Whether the configured number of steps has been played.
@@ -219,7 +311,7 @@ trait Training {
     fn iterations(&self) -> u64;
     /// Everything that the rest of the run depends on.
     fn checkpoint(&self) -> Checkpoint;
-    /// The weights as safetensors.
+    /// The weights as safetensors, with what they are.
     fn weights(&self) -> Vec<u8>;
 }
 
@@ -289,7 +381,7 @@ impl Training for Reporting {
     }
 
     fn weights(&self) -> Vec<u8> {
-        self.trainer.weights()
+        self.trainer.described_weights()
     }
 }
 
@@ -303,120 +395,4 @@ struct Row<'a> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::run_folder::Run;
-
-    /// Learns nothing; fails at the update given by `fails_at`, and is asked to stop during the one given by `stops_at`.
-    #[derive(Default)]
-    struct Counting {
-        updates: u64,
-        fails_at: Option<u64>,
-        stops_at: Option<u64>,
-        stop: StopRequest,
-    }
-
-    impl Training for Counting {
-        fn update(&mut self) -> Result<Update, mackrl::Error> {
-            self.updates += 1;
-            if self.fails_at == Some(self.updates) {
-                return Err(mackrl::Error::Data("planted".to_owned()));
-            }
-            if self.stops_at == Some(self.updates) {
-                self.stop.make();
-            }
-            Ok(Update {
-                metrics: Some(format!("{{\"t_env\":{}}}", self.updates)),
-                standing: self.standing(),
-            })
-        }
-
-        fn finished(&self) -> bool {
-            self.updates >= 3
-        }
-
-        fn standing(&self) -> Standing {
-            Standing {
-                steps_env: self.updates,
-                ..Standing::default()
-            }
-        }
-
-        fn iterations(&self) -> u64 {
-            self.updates
-        }
-
-        fn checkpoint(&self) -> Checkpoint {
-            Checkpoint {
-                tensors: vec![5],
-                counters: self.updates.to_le_bytes().to_vec(),
-            }
-        }
-
-        fn weights(&self) -> Vec<u8> {
-            vec![7, 11]
-        }
-    }
-
-    fn run(mut training: Counting) -> (tempfile::TempDir, PathBuf, Result<Summary>) {
-        let parent = tempfile::tempdir().unwrap();
-        let path = parent.path().join("run");
-        let mut config = Config::default();
-        config.run.checkpoint_interval_steps_env = 2;
-        let mut folder = RunFolder::create(&path, &config, 1).unwrap();
-        let stop = training.stop.clone();
-        let outcome = train_into(&mut folder, &mut training, &config, &stop, &mut ());
-        (parent, path, outcome)
-    }
-
-    fn status(path: &Path) -> String {
-        let text = std::fs::read_to_string(path.join("run.json")).unwrap();
-        let json: serde_json::Value = serde_json::from_str(&text).unwrap();
-        json["status"].as_str().unwrap().to_owned()
-    }
-
-    /// Updates at the latest checkpoint.
-    fn checkpoint(path: &Path) -> Option<Vec<u8>> {
-        let resumption = RunFolder::resume(path, 1).unwrap();
-        resumption.checkpoint.map(|checkpoint| checkpoint.counters)
-    }
-
-    #[test]
-    fn a_run_leaves_metrics_weights_a_checkpoint_and_its_status() {
-        let (_parent, path, outcome) = run(Counting::default());
-        assert_eq!(outcome.unwrap().steps_env, 3);
-        let metrics = std::fs::read_to_string(path.join("metrics.jsonl")).unwrap();
-        assert_eq!(metrics, "{\"t_env\":1}\n{\"t_env\":2}\n{\"t_env\":3}\n");
-        assert_eq!(Run::open(&path).unwrap().weights, [7, 11]);
-        assert_eq!(status(&path), "finished");
-        assert_eq!(checkpoint(&path), Some(3_u64.to_le_bytes().to_vec()));
-    }
-
-    #[test]
-    fn a_run_that_fails_keeps_its_latest_checkpoint_and_says_so() {
-        let (_parent, path, outcome) = run(Counting {
-            fails_at: Some(3),
-            ..Counting::default()
-        });
-        assert!(outcome.is_err());
-        assert_eq!(status(&path), "failed");
-        assert!(!path.join("weights.safetensors").exists());
-        assert_eq!(Run::open(&path).unwrap().weights, [5]);
-        assert_eq!(checkpoint(&path), Some(2_u64.to_le_bytes().to_vec()));
-    }
-
-    #[test]
-    fn a_run_that_is_asked_to_stop_writes_a_checkpoint_first() {
-        let (_parent, path, outcome) = run(Counting {
-            stops_at: Some(1),
-            ..Counting::default()
-        });
-        let message = outcome.unwrap_err().to_string();
-        assert!(
-            message.ends_with("was interrupted at 1 environment steps"),
-            "{message}"
-        );
-        assert_eq!(status(&path), "interrupted");
-        assert_eq!(checkpoint(&path), Some(1_u64.to_le_bytes().to_vec()));
-    }
-}
+mod tests;

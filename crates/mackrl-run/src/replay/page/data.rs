@@ -2,13 +2,19 @@
 
 use mackrl::policy::{GroupChoice, Mode, PairThought};
 use mackrl_env::{Action, AgentId, EntityId, Environment};
-use mackrl_run::replay::Player;
 use mackrl_skirmish::terrain::MAP_SIZE;
 use serde::Serialize;
 
-use super::super::{Opened, Summary, picture::shot};
+use crate::replay::{Names, Playback, Player, Replay, Step, Summary, shot};
 
-/// A replay.
+/// A replay that was played again.
+pub(super) struct Shown<'a> {
+    replay: &'a Replay,
+    playback: &'a Playback,
+    names: Names,
+}
+
+/// What the page knows of it.
 #[derive(Debug, Serialize)]
 pub(super) struct PageData {
     title: String,
@@ -94,12 +100,22 @@ struct Solo {
     options: Vec<(Action, f64)>,
 }
 
+impl<'a> Shown<'a> {
+    pub(super) fn new(replay: &'a Replay, playback: &'a Playback) -> Self {
+        Self {
+            replay,
+            playback,
+            names: Names::new(&playback.skirmish),
+        }
+    }
+}
+
 impl PageData {
     /// The data of a replay whose page first shows the moment after `start` steps.
-    pub(super) fn of(opened: &Opened, start: usize) -> Self {
-        let playback = &opened.playback;
+    pub(super) fn of(shown: &Shown<'_>, start: usize) -> Self {
+        let playback = shown.playback;
         let skirmish = &playback.skirmish;
-        let summary = Summary::of(opened);
+        let summary = Summary::of(shown.replay, playback);
         let terrain = &skirmish.scenario().field.terrain;
         let cells = || 0..i32::try_from(MAP_SIZE).unwrap_or(i32::MAX);
         let row = |y: i32| -> String {
@@ -107,12 +123,12 @@ impl PageData {
             cells().map(cell).collect()
         };
         Self {
-            title: format!("{} by {}", skirmish.spec().name, player(opened)),
+            title: format!("{} by {}", skirmish.spec().name, player(shown)),
             subtitle: format!(
                 "{}; seed {}, episode {}",
                 summary.outcome(),
-                opened.replay.key.seed,
-                opened.replay.key.episode
+                shown.replay.key.seed,
+                shown.replay.key.episode
             ),
             outcome: summary.outcome(),
             start,
@@ -121,21 +137,21 @@ impl PageData {
             sight: f64::from(skirmish.settings().sight_range),
             agents: skirmish.spec().agents,
             entities: (0..playback.moments[0].state.units.len())
-                .map(|entity| Entity::of(opened, entity))
+                .map(|entity| Entity::of(shown, entity))
                 .collect(),
             frames: (0..playback.moments.len())
-                .map(|step| Frame::of(opened, step))
+                .map(|step| Frame::of(shown, step))
                 .collect(),
             rewards: playback.reward_t.iter().map(|r| rounded(*r, 4)).collect(),
-            decisions: opened.replay.steps.iter().map(Decision::of).collect(),
+            decisions: shown.replay.steps.iter().map(Decision::of).collect(),
         }
     }
 }
 
 /// Who played, and how.
-fn player(opened: &Opened) -> String {
-    let name = opened.replay.player.name();
-    match opened.replay.player {
+fn player(shown: &Shown<'_>) -> String {
+    let name = shown.replay.player.name();
+    match shown.replay.player {
         Player::Script { .. } | Player::Client => name,
         Player::Policy { behaviour, .. } => match behaviour.mode {
             Mode::Greedy => format!("{name}, greedy"),
@@ -145,14 +161,14 @@ fn player(opened: &Opened) -> String {
 }
 
 impl Entity {
-    fn of(opened: &Opened, entity: usize) -> Self {
-        let playback = &opened.playback;
+    fn of(shown: &Shown<'_>, entity: usize) -> Self {
+        let playback = shown.playback;
         let unit = &playback.moments[0].state.units[entity];
         let profile = &playback.skirmish.scenario().field.profiles[usize::from(unit.kind)];
         let id = EntityId::new(entity);
         Self {
-            name: opened.names.entity(id),
-            kind: opened.names.kind(id).to_owned(),
+            name: shown.names.entity(id),
+            kind: shown.names.kind(id).to_owned(),
             radius: rounded(profile.radius, 3),
             shield: profile.shield > 0.0,
             heals: profile.care.is_some(),
@@ -161,8 +177,8 @@ impl Entity {
 }
 
 impl Frame {
-    fn of(opened: &Opened, step: usize) -> Self {
-        let playback = &opened.playback;
+    fn of(shown: &Shown<'_>, step: usize) -> Self {
+        let playback = shown.playback;
         let moment = &playback.moments[step];
         let before = &playback.moments[step.saturating_sub(1)].state;
         let state = &moment.state;
@@ -205,7 +221,7 @@ impl Frame {
 }
 
 impl Decision {
-    fn of(step: &mackrl_run::replay::Step) -> Self {
+    fn of(step: &Step) -> Self {
         let thought = step.thought.clone().unwrap_or_default();
         let is_known = step.thought.is_some();
         Self {
