@@ -305,7 +305,11 @@ fn every_measurement_says_what_it_measured() {
         let total: f64 = shares.values().filter_map(serde_json::Value::as_f64).sum();
         assert!((total - 1.0).abs() < 1e-9, "{training}");
         let finds_knowledge = shares["common_knowledge"].as_f64() > Some(0.0);
-        assert_eq!(finds_knowledge, algorithm.starts_with("mackrl"), "{training}");
+        assert_eq!(
+            finds_knowledge,
+            algorithm.starts_with("mackrl"),
+            "{training}"
+        );
     }
 }
 
