@@ -9,6 +9,7 @@ use support::{checkpoints, exits, mackrl, resume};
 
 /// Rewards of 10¹⁸ and a critic whose gradient is not shortened: after some updates its square is infinite.
 const HUGE: &[&str] = &[
+    "algorithm.name=mackrl",
     "algorithm.hidden=8",
     "env.reward_negative_scale=1e9",
     "env.reward_death_value=1e9",

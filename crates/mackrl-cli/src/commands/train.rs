@@ -30,8 +30,11 @@ pub(super) fn print(summary: &Summary, json: bool) -> anyhow::Result<()> {
     if json {
         return output::print_json(summary);
     }
+    let won = summary.battle_won_mean.map_or_else(String::new, |won| {
+        format!("; the team wins {:.0} % of its last test", 100.0 * won)
+    });
     output::print(&format!(
-        "{}: {} environment steps in {:.1} s ({:.0} a second)\n",
+        "{}: {} environment steps in {:.1} s ({:.0} a second){won}\n",
         summary.folder.display(),
         summary.steps_env,
         summary.wall_s,

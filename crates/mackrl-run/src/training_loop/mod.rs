@@ -64,6 +64,8 @@ pub struct Summary {
     pub wall_s: f64,
     /// Environment steps a second in that time, everything included.
     pub steps_per_s: f64,
+    /// Share of battles won in the last greedy test, in [0, 1], if the world counts them.
+    pub battle_won_mean: Option<f64>,
 }
 
 /// Makes the run that `config` describes, in `world`, and keeps metrics, checkpoints, status and weights in a new folder at `path`.
@@ -287,6 +289,7 @@ fn continue_into<T: Training>(
         steps_env,
         wall_s,
         steps_per_s: (steps_env - steps_env_before) as f64 / wall_s.max(1e-9),
+        battle_won_mean: standing.battle_won_mean,
     })
 }
 

@@ -152,14 +152,15 @@ impl Gru {
         ]
     }
 
-    /// One step; the gates [n, r, z, q] are kept for the backward pass.
+    /// One step; the gates [n, r, z, q] are kept for the backward pass. Where all rows begin, from hidden states of zero, the products
+    /// with these are left out, which changes no bit.
     ///
     /// # Shapes
     /// `x` [rows, inputs], `previous` and `next` [rows, hidden], `gates` [rows, 4 hidden].
     pub(crate) fn forward<E: Element>(
         &self,
         weights: &GruWeights<E>,
-        rows: usize,
+        (rows, begins): (usize, bool),
         x: &[E],
         previous: &[E],
         gates: &mut [E],
@@ -183,28 +184,34 @@ impl Gru {
             c_stride,
         }
         .compute();
-        let a = Rows {
-            values: previous,
-            stride: h,
-        };
-        Product {
-            rows,
-            a,
-            b: &weights.hidden_forward,
-            start: Start::Kept,
-            c: &mut gates[h..],
-            c_stride,
+        if begins {
+            for gates in gates.chunks_exact_mut(c_stride).take(rows) {
+                gates[3 * h..].copy_from_slice(&weights.candidate_bias);
+            }
+        } else {
+            let a = Rows {
+                values: previous,
+                stride: h,
+            };
+            Product {
+                rows,
+                a,
+                b: &weights.hidden_forward,
+                start: Start::Kept,
+                c: &mut gates[h..],
+                c_stride,
+            }
+            .compute();
+            Product {
+                rows,
+                a,
+                b: &weights.candidate_forward,
+                start: Start::Bias(&weights.candidate_bias),
+                c: &mut gates[3 * h..],
+                c_stride,
+            }
+            .compute();
         }
-        .compute();
-        Product {
-            rows,
-            a,
-            b: &weights.candidate_forward,
-            start: Start::Bias(&weights.candidate_bias),
-            c: &mut gates[3 * h..],
-            c_stride,
-        }
-        .compute();
         E::dispatch(Activate {
             hidden: h,
             rows,
@@ -214,14 +221,15 @@ impl Gru {
         });
     }
 
-    /// Replaces the gates by the gradients of their pre-activations, and `gradient`, that of h', by that of h.
+    /// Replaces the gates by the gradients of their pre-activations, and `gradient`, that of h', by that of h (or by something that
+    /// is not to be read, if all rows begin).
     ///
     /// # Shapes
     /// `previous` and `gradient` [rows, hidden], `gates` [rows, 4 hidden].
     pub(crate) fn hidden_gradient<E: Element>(
         &self,
         weights: &GruWeights<E>,
-        rows: usize,
+        (rows, begins): (usize, bool),
         previous: &[E],
         gates: &mut [E],
         gradient: &mut [E],
@@ -237,6 +245,9 @@ impl Gru {
             gates: &mut *gates,
             gradient: &mut *gradient,
         });
+        if begins {
+            return;
+        }
         Product {
             rows,
             a: Rows {
@@ -276,7 +287,7 @@ impl Gru {
     /// Adds the parameters' gradients to the flat `gradient`, from the gradients of the gates.
     pub(crate) fn parameter_gradient<E: Element>(
         &self,
-        rows: usize,
+        (rows, begins): (usize, bool),
         x: &[E],
         previous: &[E],
         gates: &[E],
@@ -299,11 +310,13 @@ impl Gru {
             values: &gates[from..],
             stride: GATES * h,
         });
-        for (place, to, a, d, columns) in [
+        let products = [
             (&self.weight_ih, 0, x, rz, 2 * h),
             (&self.weight_ih, 2 * h, x, n, h),
             (&self.weight_hh, 0, previous, rzq, 3 * h),
-        ] {
+        ];
+        let count = if begins { 2 } else { 3 };
+        for (place, to, a, d, columns) in products.into_iter().take(count) {
             WeightGradient {
                 rows,
                 inner: a.stride,
@@ -350,11 +363,11 @@ mod tests {
         let mut weights = GruWeights::default();
         gru.refresh_forward(&parameters, &mut weights);
         gru.refresh_backward(&parameters, &mut weights);
-        gru.forward(&weights, 0, &[], &[], &mut [], &mut []);
-        gru.hidden_gradient(&weights, 0, &[], &mut [], &mut []);
+        gru.forward(&weights, (0, false), &[], &[], &mut [], &mut []);
+        gru.hidden_gradient(&weights, (0, false), &[], &mut [], &mut []);
         let mut gradient = vec![0.0; layout.len()];
         let scratch = &mut Aligned::default();
-        gru.parameter_gradient(0, &[], &[], &[], &mut gradient, scratch);
+        gru.parameter_gradient((0, false), &[], &[], &[], &mut gradient, scratch);
         assert_eq!(gradient, vec![0.0; layout.len()]);
     }
 }

@@ -151,6 +151,7 @@ impl RecurrentNetwork {
         } = trace.sizes;
         let range = trace.last_rows();
         let (first, rows) = (range.start, range.len());
+        let begins = trace.last_step().begins;
         assert_eq!(x.len(), rows * inputs, "inputs are [rows, inputs]");
         if rows == 0 {
             return;
@@ -171,7 +172,7 @@ impl RecurrentNetwork {
         let next = &mut trace.hidden.as_mut_slice()[first * hidden..];
         self.gru.forward(
             &weights.gru,
-            rows,
+            (rows, begins),
             features,
             &trace.previous.as_slice()[first * hidden..],
             &mut trace.gates.as_mut_slice()[first * GATES * hidden..],
@@ -235,7 +236,8 @@ impl RecurrentNetwork {
         let mut end = trace.steps.len();
         while end > 0 {
             let block = block_before(&trace.steps, end);
-            let rows = trace.steps[block.start].rows.start..trace.steps[end - 1].rows.end;
+            let start = block.start;
+            let rows = trace.steps[start].rows.start..trace.steps[end - 1].rows.end;
             trace
                 .workspace
                 .features_gradient
@@ -248,11 +250,12 @@ impl RecurrentNetwork {
                 trace.carry_gradient_back(t);
             }
             if !rows.is_empty() {
-                let asked = trace.steps[block.start].asked.start..trace.steps[end - 1].asked.end;
+                let asked = trace.steps[start].asked.start..trace.steps[end - 1].asked.end;
                 self.output_gradient(trace, asked, gradient);
-                self.parameter_gradient(x, trace, rows, gradient);
+                let begins = trace.steps[block].iter().all(|step| step.begins);
+                self.parameter_gradient(x, trace, (rows, begins), gradient);
             }
-            end = block.start;
+            end = start;
         }
     }
 
@@ -267,6 +270,7 @@ impl RecurrentNetwork {
         let hidden = trace.sizes.hidden;
         let first = trace.steps[t].rows.start;
         let rows = trace.steps[t].rows.len();
+        let begins = trace.steps[t].begins;
         self.output_backward(weights, trace, t);
         let Workspace {
             features_gradient,
@@ -276,8 +280,13 @@ impl RecurrentNetwork {
         let hidden_gradient = hidden_gradient.as_mut_slice();
         let gates = &mut trace.gates.as_mut_slice()[first * GATES * hidden..];
         let previous = &trace.previous.as_slice()[first * hidden..];
-        self.gru
-            .hidden_gradient(&weights.gru, rows, previous, gates, hidden_gradient);
+        self.gru.hidden_gradient(
+            &weights.gru,
+            (rows, begins),
+            previous,
+            gates,
+            hidden_gradient,
+        );
 
         let place = (first - block_start) * hidden;
         let features_gradient = &mut features_gradient.as_mut_slice()[place..][..rows * hidden];
@@ -374,7 +383,7 @@ impl RecurrentNetwork {
         &self,
         x: &[E],
         trace: &mut Trace<E>,
-        rows: Range<usize>,
+        (rows, begins): (Range<usize>, bool),
         gradient: &mut [E],
     ) {
         let NetworkSizes { inputs, hidden, .. } = trace.sizes;
@@ -387,8 +396,14 @@ impl RecurrentNetwork {
         let features = &trace.features.as_slice()[first * hidden..];
         let previous = &trace.previous.as_slice()[first * hidden..];
         let gates = &trace.gates.as_slice()[first * GATES * hidden..];
-        self.gru
-            .parameter_gradient(count, features, previous, gates, gradient, scratch);
+        self.gru.parameter_gradient(
+            (count, begins),
+            features,
+            previous,
+            gates,
+            gradient,
+            scratch,
+        );
 
         let x = &x[first * inputs..];
         self.input

@@ -32,6 +32,8 @@ pub(crate) struct Step {
     pub(crate) asked: Range<usize>,
     /// Whether row i continues row i of the previous step, for every i.
     pub(crate) unchanged: bool,
+    /// Whether every row begins with a hidden state of zero.
+    pub(crate) begins: bool,
 }
 
 /// The activations of a recurrent network, step after step.
@@ -171,6 +173,8 @@ impl<R: Real> Trace<R> {
             states.fill(R::ZERO);
             self.carry.extend(0..rows);
         }
+        let begins =
+            previous.is_none() || carry.is_some_and(|carry| carry.iter().all(|&row| row == BEGINS));
         let unchanged = carry.is_none() && previous.is_none_or(|previous| previous.len() == rows);
         let asked = if self.selective { 0 } else { rows };
         self.logits.grow((first_asked + asked) * self.sizes.outputs);
@@ -178,6 +182,7 @@ impl<R: Real> Trace<R> {
             rows: start..start + rows,
             asked: first_asked..first_asked + asked,
             unchanged,
+            begins,
         });
         self.steps_begun += 1;
     }

@@ -75,10 +75,13 @@ impl<'a> Explainer<'a> {
             remark: remark(*preset, key),
         });
         let origin = self.resolved.origin(key);
+        // Two algorithms may call different things by one name.
+        let chosen = self.resolved.config().settings();
+        let chosen = chosen.iter().find(|own| own.key == *key).unwrap_or(setting);
         Explanation {
             key: key.clone(),
-            meaning: setting.meaning,
-            accepts: setting.accepts.to_string(),
+            meaning: chosen.meaning,
+            accepts: chosen.accepts.to_string(),
             built_in: self.built_in.get(key),
             presets: in_presets.collect(),
             value: self.resolved.config().get(key),
