@@ -13,6 +13,8 @@ use proptest::prelude::*;
 /// Settings that decide how long a run takes, with the most that a test can wait for.
 const COSTLY: &[(&str, u64)] = &[
     ("algorithm.hidden", 5),
+    ("algorithm.critic_hidden", 5),
+    ("algorithm.epochs", 3),
     ("algorithm.environments", 3),
     ("test.episodes", 2),
     ("run.steps_env", 3),
@@ -25,6 +27,7 @@ const COMBINED: &[&str] = &[
     "env.shoot_range",
     "env.sight_range",
     "algorithm.partitions",
+    "algorithm.hold_steps_env",
 ];
 
 /// Values of settings that are words of another kind.
@@ -75,11 +78,14 @@ fn inner(bound: Bound<f64>, direction: f64) -> f64 {
 }
 
 /// Worlds and algorithms that need nothing but this program.
-const CHOICES: [[&str; 2]; 4] = [
+const CHOICES: [[&str; 2]; 7] = [
     ["env.name=skirmish", "algorithm.name=mackrl"],
     ["env.name=skirmish", "algorithm.name=central-v"],
     ["env.name=matrix-game", "algorithm.name=mackrl"],
     ["env.name=matrix-game", "algorithm.name=central-v"],
+    ["env.name=skirmish", "algorithm.name=mackrl-ppo"],
+    ["env.name=skirmish", "algorithm.name=ippo"],
+    ["env.name=matrix-game", "algorithm.name=mackrl-ppo"],
 ];
 
 /// The settings of a choice, its names aside.
@@ -102,7 +108,10 @@ prop_compose! {
             })))
             .collect::<Vec<_>>(),
     ) -> Vec<String> {
-        let short = COSTLY.iter().map(|(key, most)| format!("{key}={most}"));
+        let settings = settings(choice);
+        let has = |key: &str| settings.iter().any(|setting| setting.key == key);
+        let short = COSTLY.iter().filter(|(key, _)| has(key));
+        let short = short.map(|(key, most)| format!("{key}={most}"));
         let choice = choice.map(str::to_owned).into_iter();
         choice.chain(short).chain(values.into_iter().flatten()).collect()
     }

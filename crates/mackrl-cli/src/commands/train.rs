@@ -63,7 +63,7 @@ mod tests {
     fn a_run_is_named_after_what_makes_it_different() {
         assert_eq!(
             default_folder(&Config::default()),
-            Path::new("runs/3m-mackrl-ppo-seed1")
+            Path::new("runs/3m-mackrl-seed1")
         );
     }
 }

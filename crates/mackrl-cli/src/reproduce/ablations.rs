@@ -132,10 +132,7 @@ fn variants(preset: &Config) -> Vec<Arm> {
 
 #[cfg(test)]
 mod tests {
-    use mackrl_run::{
-        config::ConfigBuilder,
-        recorded::{TrainingRun, setting},
-    };
+    use mackrl_run::{config::ConfigBuilder, recorded::TrainingRun};
 
     use super::*;
     use crate::reproduce::learning::{Body, Report, Variant};

@@ -1,7 +1,7 @@
 //! The levels of the hierarchy, advanced by one step.
 //!
 //! At every step the recurrence of each group advances, chosen or not: which division a later step will choose is not known
-//! now. Rows of groups with a dead member are dropped where their one choice is forced. Which groups *can* be chosen at this
+//! now. Only a level whose controllers [remember while formed](Memory::WhileFormed) has rows of the formed groups alone. Rows of groups with a dead member are dropped where their one choice is forced. Which groups *can* be chosen at this
 //! step is known: where divisions take turns, only the groups of the one in force are asked for their choice, which is
 //! exact, since what the others would have said is never read. Of 27 agents that is 13 pairs of 351.
 
