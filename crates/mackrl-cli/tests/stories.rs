@@ -163,7 +163,7 @@ fn a_value_out_of_range_says_what_is_expected() {
     hint: algorithm.gamma: Discount γ of one environment step.
     ");
     insta::assert_snapshot!(type_in("config --algorithm qmix").fails(64), @r#"
-    error: --algorithm qmix: `algorithm.name` is "qmix", expected `mackrl` or `central-v`
+    error: --algorithm qmix: `algorithm.name` is "qmix", expected `mackrl`, `central-v`, `mackrl-ppo`, `mappo` or `ippo`
     hint: algorithm.name: What learns; which other settings `algorithm` has depends on it.
     "#);
 }
@@ -182,7 +182,7 @@ fn a_setting_of_version_0_1_0_is_told_by_its_name_now() {
 
 #[test]
 fn an_unknown_preset_names_its_neighbour() {
-    insta::assert_snapshot!(type_in("config --preset papre").fails(64), @"error: unknown preset `papre`, expected default, fours, paper, paper-code, did you mean `paper`?");
+    insta::assert_snapshot!(type_in("config --preset papre").fails(64), @"error: unknown preset `papre`, expected default, fours, paper, paper-code, paper-figures, did you mean `paper`?");
 }
 
 #[test]
@@ -234,6 +234,7 @@ fn a_setting_is_explained_with_its_value_everywhere() {
       preset fours       0.8
       preset paper       0.8   "TD-lambda of 0.8"
       preset paper-code  0.8
+      preset paper-figures  0.8
       here               0.5   --set algorithm.lambda=0.5
     "#);
     let section = type_in("config --explain test --json").succeeds();
@@ -446,7 +447,7 @@ fn a_scenario_of_ones_own_is_checked_played_and_trained_on() {
     story("train --map ./my.toml --steps 100 --set test.episodes=2 --seed 2").succeeds();
     // The run holds all that it depends on.
     std::fs::remove_file(folder.path().join("my.toml")).expect("the file is there");
-    story("evaluate runs/my-mackrl-seed2 --episodes 2").succeeds();
+    story("evaluate runs/my-mackrl-ppo-seed2 --episodes 2").succeeds();
 }
 
 #[test]

@@ -123,6 +123,15 @@ impl Tables {
         let in_force = parts.declaration.in_force(key, step, &mut self.buffer);
         for part in in_force.iter().flat_map(|division| &division.parts) {
             self.possible_g[part.level][part.group] = true;
+            // Those that they divide into are asked when they do.
+            for &inner in parts
+                .declaration
+                .divisions(*part, in_force)
+                .iter()
+                .flat_map(|own| &own.parts)
+            {
+                self.possible_g[inner.level][inner.group] = true;
+            }
         }
     }
 
