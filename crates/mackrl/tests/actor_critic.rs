@@ -234,10 +234,17 @@ fn the_average_decides_what_steps_count_for_and_nothing_else() {
             loss_average,
             ..settings()
         };
-        let mut subject = Subject::playing(settings, [0, 2]);
-        let episodes = subject.piece().experience.episodes.iter();
-        let lengths: Vec<usize> = episodes.map(Episode::steps).collect();
-        assert_ne!(lengths[0], lengths[1], "episodes of one length count alike");
+        // Episodes of one length count alike.
+        let subjects = (1..20).map(|later| Subject::playing(settings, [0, later]));
+        let differ = |subject: &mut Subject| {
+            let episodes = subject.piece().experience.episodes.iter();
+            let lengths: Vec<usize> = episodes.map(Episode::steps).collect();
+            lengths[0] != lengths[1]
+        };
+        let mut subject = subjects
+            .filter_map(|mut subject| differ(&mut subject).then_some(subject))
+            .next()
+            .expect("episodes of two lengths");
         subject.learn().expect("finite gradients")
     });
     let mean = |report: &Tally, name: &str| {

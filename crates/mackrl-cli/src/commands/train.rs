@@ -61,9 +61,9 @@ mod tests {
 
     #[test]
     fn a_run_is_named_after_what_makes_it_different() {
-        assert_eq!(
-            default_folder(&Config::default()),
-            Path::new("runs/3m-mackrl-seed1")
-        );
+        let config = Config::default();
+        let algorithm = config.algorithm.name();
+        let expected = format!("runs/3m-{algorithm}-seed1");
+        assert_eq!(default_folder(&config), Path::new(&expected));
     }
 }

@@ -269,7 +269,7 @@ mod tests {
                     assert_eq!(names, (world.name(), algorithm.name()));
                     let moves = config.get("env.move_amount");
                     let expected = match (world.name(), preset.name) {
-                        ("skirmish" | "sc2", "paper-code" | "fours") => {
+                        ("skirmish" | "sc2", "paper-code" | "paper-figures" | "fours") => {
                             Some(toml::Value::Float(5.0))
                         }
                         ("skirmish" | "sc2", _) => Some(toml::Value::Float(2.0)),

@@ -144,6 +144,11 @@ mod tests {
 
     /// Whether `value` is what `schema` describes, for the words that are used here; gives the path of the first difference.
     fn differs(schema: &Value, value: &Value, path: &str) -> Option<String> {
+        if let Some(any) = schema.get("anyOf").and_then(Value::as_array) {
+            // What one of them takes is right.
+            let found = any.iter().map(|schema| differs(schema, value, path));
+            return found.collect::<Option<Vec<_>>>()?.pop();
+        }
         let number = |name: &str| schema.get(name).and_then(Value::as_f64);
         let right_type = match schema.get("type").and_then(Value::as_str) {
             Some("object") => value.is_object(),

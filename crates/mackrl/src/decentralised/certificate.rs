@@ -292,7 +292,7 @@ impl Subject<'_, '_> {
     }
 
     /// Repeats the central run of an episode with another key. What an agent's controllers compute is a function of what was seen
-    /// and of what the agent did; of the key it is none. In greedy play actions are no function of it either, if the policy
+    /// and of what the agent did; of the key it is none, unless the policy says so of a controller. In greedy play actions are no function of it either, if the policy
     /// says so.
     fn compare_other_key(
         &self,
@@ -316,6 +316,10 @@ impl Subject<'_, '_> {
                     continue;
                 }
                 let mut expected = recorded.computed_tn[step][agent].clone();
+                let is_free =
+                    |(controller, _): &(ControllerId, _)| !self.policy.is_drawn(controller);
+                expected.inputs.retain(is_free);
+                expected.outputs.retain(is_free);
                 has_done_the_same_n[agent] = expected.action == found.action;
                 if !decides_nothing {
                     // Other actions may be drawn, and other groups be asked.

@@ -40,7 +40,10 @@ use self::{actor::TeamActor, bank::Bank, executor::AgentExecutor};
 use crate::{
     common_knowledge::CommonKnowledgeFeatures,
     nn::{ParameterLayout, RecurrentWeights},
-    policy::{Actor, ControllerDescription, Declaration, Executor, Parameters, Part, Policy, TEAM},
+    policy::{
+        Actor, ControllerDescription, ControllerId, Declaration, Executor, Memory, Parameters,
+        Part, Policy, TEAM,
+    },
 };
 
 /// What the controllers of a hierarchy are made of.
@@ -213,5 +216,12 @@ impl Policy for Hierarchy {
         let declaration = &self.parts.declaration;
         let mut levels = declaration.levels().iter();
         !declaration.is_fixed() || levels.any(|level| level.divisions > 1 && !level.is_learned())
+    }
+
+    fn is_drawn(&self, controller: &ControllerId) -> bool {
+        let declaration = &self.parts.declaration;
+        let mut levels = declaration.levels().iter();
+        let level = levels.find(|level| level.name == controller.name);
+        !declaration.is_fixed() && level.is_some_and(|level| level.memory == Memory::WhileFormed)
     }
 }

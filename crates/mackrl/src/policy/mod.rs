@@ -128,6 +128,13 @@ pub trait Policy: Send + Sync + Debug {
     fn draws_when_greedy(&self) -> bool {
         true
     }
+
+    /// Whether the key of an episode decides since when a controller takes part and remembers, such as that of a pair whose partition
+    /// takes turns. What it computes is then a function of the key as well, and another key need not lead to the same.
+    fn is_drawn(&self, controller: &ControllerId) -> bool {
+        let _ = controller;
+        false
+    }
 }
 
 /// Plays a team in several environments at once.
