@@ -166,8 +166,7 @@ fn groups_together_are_the_marginal_of_the_team() {
                 &parameters,
                 experience,
                 activations,
-                (&factors, &d),
-                0.0,
+                (&factors, &d, 0.0),
                 &mut FactorWorkspace::default(),
                 &mut gradient,
             );
@@ -206,8 +205,7 @@ fn the_gradient_of_the_entropy_is_that_of_the_networks() {
             &parameters,
             experience,
             activations,
-            (&factors, &d),
-            1.0,
+            (&factors, &d, 1.0),
             &mut FactorWorkspace::default(),
             &mut gradient,
         );

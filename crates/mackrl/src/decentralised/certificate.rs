@@ -304,6 +304,7 @@ impl Subject<'_, '_> {
             recorded.behaviour.mode == Mode::Greedy && !self.policy.draws_when_greedy();
         let mut central = Central::begin(self.policy, self.parameters, agents);
         let mut has_done_the_same_n = vec![true; agents];
+        let mut histories_n = vec![History::default(); agents];
         for (step, observations) in recorded.observations_t.iter().enumerate() {
             let key = &recorded.keys.other;
             let action_n = central.act(step, key, observations, recorded.behaviour)?;
@@ -322,13 +323,9 @@ impl Subject<'_, '_> {
                 expected.outputs.retain(is_free);
                 has_done_the_same_n[agent] = expected.action == found.action;
                 if !decides_nothing {
-                    // Other actions may be drawn, and other groups be asked.
+                    // Other actions may be drawn, other groups be formed, and others be asked.
                     found.action = expected.action;
-                    let is_asked =
-                        |own: &ControllerId| found.outputs.iter().any(|(other, _)| other == own);
-                    expected
-                        .outputs
-                        .retain(|(controller, _)| is_asked(controller));
+                    histories_n[agent].keep_common(&mut expected, &mut found);
                 }
                 let place = recorded.place(Check::OtherKey, step, AgentId::new(agent));
                 compare(place, &expected, &found, certificate);
@@ -336,6 +333,46 @@ impl Subject<'_, '_> {
         }
         Ok(())
     }
+}
+
+/// Which controllers ran at the latest step under two keys.
+#[derive(Debug, Clone, Default)]
+struct History {
+    ran: [Vec<ControllerId>; 2],
+    /// Those that ran at the same steps under both since they began.
+    alike: Vec<ControllerId>,
+}
+
+impl History {
+    /// Keeps what can be compared: inputs of controllers that run under both keys, and outputs of those that did so, too, as long as
+    /// they remember. A group's controller may remember no longer than the group is formed, and the key decides which are.
+    fn keep_common(&mut self, expected: &mut Computed, found: &mut Computed) {
+        let own = |computed: &Computed| -> Vec<ControllerId> {
+            let inputs = computed.inputs.iter();
+            inputs.map(|(controller, _)| controller.clone()).collect()
+        };
+        let ran = [own(expected), own(found)];
+        let both = |controller: &ControllerId| ran.iter().all(|own| own.contains(controller));
+        let before =
+            |controller: &ControllerId| self.ran.iter().any(|own| own.contains(controller));
+        let mut alike = ran[0].clone();
+        alike.retain(|own| both(own) && (!before(own) || self.alike.contains(own)));
+        for computed in [&mut *expected, &mut *found] {
+            computed.inputs.retain(|(own, _)| both(own));
+            computed.outputs.retain(|(own, _)| alike.contains(own));
+        }
+        let asked = own_outputs(found);
+        expected.outputs.retain(|(own, _)| asked.contains(own));
+        let asked = own_outputs(expected);
+        found.outputs.retain(|(own, _)| asked.contains(own));
+        self.ran = ran;
+        self.alike = alike;
+    }
+}
+
+fn own_outputs(computed: &Computed) -> Vec<ControllerId> {
+    let outputs = computed.outputs.iter();
+    outputs.map(|(controller, _)| controller.clone()).collect()
 }
 
 impl Recorded {

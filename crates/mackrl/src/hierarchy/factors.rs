@@ -190,6 +190,9 @@ impl Hierarchy {
     ///
     /// # Shapes
     /// `log_q_i` becomes as long as `factors`.
+    ///
+    /// # Panics
+    /// If a factor is a pair of a hierarchy without pairs.
     pub fn log_q(&self, activations: &Activations, factors: &[Factor], log_q_i: &mut Vec<f32>) {
         let (pairs, agents) = self.parts.split(activations);
         log_q_i.clear();
@@ -215,8 +218,7 @@ impl Hierarchy {
         parameters: &Parameters,
         experience: &Experience,
         activations: &mut Activations,
-        (factors, d_log_q_i): (&[Factor], &[f32]),
-        entropy_weight: f32,
+        (factors, d_log_q_i, entropy_weight): (&[Factor], &[f32], f32),
         workspace: &mut FactorWorkspace,
         gradient: &mut [f32],
     ) -> f64 {

@@ -1,4 +1,4 @@
-//! The marginal of one pair, q(u) = π(u) + π(delegate) π_a(u_a) π_b(u_b): its logarithm, its entropy, and the way back to logits.
+//! The marginal of one pair, `q(u) = π(u) + π(delegate) π_a(u_a) π_b(u_b)`: its logarithm, its entropy, and the way back to logits.
 //!
 //! Where one partition is in force, p(u) is the product of its groups' marginals, and a learner may weigh each group by itself.
 //! The entropy is that of the *marginal*, over all A² joint actions: a bonus on the pair controller's own choices would reward it

@@ -233,7 +233,7 @@ impl Algorithm for Ppo {
         self.finish_preparation(batch, &sums);
         stopwatch.lap(Phase::Critic);
         let weights = [sums.advantages[0], sums.returns[0]];
-        let weights = weights.map(|count| 1.0 / count as f32);
+        let weights = weights.map(|count| Real::from_f64(1.0 / count));
         let mut tally = Tally::default();
         let choices = (self.memories.iter().map(|memory| memory.advantage_i.len())).sum::<usize>();
         for epoch in 0..self.settings.epochs {

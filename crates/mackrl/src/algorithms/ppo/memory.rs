@@ -232,8 +232,11 @@ impl Memory {
             parameters,
             experience,
             activations,
-            (&self.factors, &self.d_log_q_i),
-            -rule.weights[0] * rule.entropy_weight,
+            (
+                &self.factors,
+                &self.d_log_q_i,
+                -rule.weights[0] * rule.entropy_weight,
+            ),
             &mut self.workspace,
             &mut self.gradient,
         );
