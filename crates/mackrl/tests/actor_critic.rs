@@ -235,7 +235,7 @@ fn the_average_decides_what_steps_count_for_and_nothing_else() {
             ..settings()
         };
         // Episodes of one length count alike.
-        let subjects = (1..20).map(|later| Subject::playing(settings, [0, later]));
+        let subjects = (1..20).map(|later| Subject::playing(settings.clone(), [0, later]));
         let differ = |subject: &mut Subject| {
             let episodes = subject.piece().experience.episodes.iter();
             let lengths: Vec<usize> = episodes.map(Episode::steps).collect();

@@ -98,7 +98,9 @@ fn round_robin(map: &str, hold: usize, memory: Memory) -> Team {
         Default::default(),
         1,
     );
-    let declaration = declaration.unwrap().with_partitions_held(hold, memory);
+    let declaration = declaration
+        .expect("a small team")
+        .with_partitions_held(hold, memory);
     let settings = HierarchySettings {
         common_knowledge: CommonKnowledgeFeatures::Complete,
         hidden: 5,
@@ -110,7 +112,7 @@ fn round_robin(map: &str, hold: usize, memory: Memory) -> Team {
     Team::declared(world, declaration, settings)
 }
 
-/// Σ_g log q_g is the log p(u) that acting recorded, and where all groups of a step weigh alike the gradient is the marginal's.
+/// `Σ_g log q_g` is the log p(u) that acting recorded, and where all groups of a step weigh alike the gradient is the marginal's.
 #[test]
 fn groups_together_are_the_marginal_of_the_team() {
     for (hold, memory) in [

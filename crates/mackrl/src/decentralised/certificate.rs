@@ -317,15 +317,12 @@ impl Subject<'_, '_> {
                     continue;
                 }
                 let mut expected = recorded.computed_tn[step][agent].clone();
-                let is_free =
-                    |(controller, _): &(ControllerId, _)| !self.policy.is_drawn(controller);
-                expected.inputs.retain(is_free);
-                expected.outputs.retain(is_free);
                 has_done_the_same_n[agent] = expected.action == found.action;
                 if !decides_nothing {
                     // Other actions may be drawn, other groups be formed, and others be asked.
                     found.action = expected.action;
-                    histories_n[agent].keep_common(&mut expected, &mut found);
+                    let is_drawn = |own: &ControllerId| self.policy.is_drawn(own);
+                    histories_n[agent].keep_common(&mut expected, &mut found, is_drawn);
                 }
                 let place = recorded.place(Check::OtherKey, step, AgentId::new(agent));
                 compare(place, &expected, &found, certificate);
@@ -344,9 +341,15 @@ struct History {
 }
 
 impl History {
-    /// Keeps what can be compared: inputs of controllers that run under both keys, and outputs of those that did so, too, as long as
-    /// they remember. A group's controller may remember no longer than the group is formed, and the key decides which are.
-    fn keep_common(&mut self, expected: &mut Computed, found: &mut Computed) {
+    /// Keeps what can be compared: inputs of controllers that run under both keys or would have to, and outputs of those that did
+    /// so, too, as long as they remember. A group's controller may remember no longer than the group is formed; which are formed is
+    /// drawn.
+    fn keep_common(
+        &mut self,
+        expected: &mut Computed,
+        found: &mut Computed,
+        is_drawn: impl Fn(&ControllerId) -> bool,
+    ) {
         let own = |computed: &Computed| -> Vec<ControllerId> {
             let inputs = computed.inputs.iter();
             inputs.map(|(controller, _)| controller.clone()).collect()
@@ -358,7 +361,7 @@ impl History {
         let mut alike = ran[0].clone();
         alike.retain(|own| both(own) && (!before(own) || self.alike.contains(own)));
         for computed in [&mut *expected, &mut *found] {
-            computed.inputs.retain(|(own, _)| both(own));
+            (computed.inputs).retain(|(own, _)| both(own) || !is_drawn(own));
             computed.outputs.retain(|(own, _)| alike.contains(own));
         }
         let asked = own_outputs(found);
