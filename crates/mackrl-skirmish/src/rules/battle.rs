@@ -5,8 +5,8 @@ use std::sync::Arc;
 use crate::rules::{
     BattleState, Battlefield, Chance, Order, Stance, Team, Unit, UnitIndex,
     combat::Hit,
-    movement::{Footing, Obstacle, Steps, on_grid},
-    neighbours::Neighbours,
+    movement::{Footing, Obstacle, Plane, on_grid},
+    neighbours::Discs,
 };
 
 /// A battle: what changes, on what does not.
@@ -32,12 +32,12 @@ pub(super) struct Scratch {
     pub(super) supports: Vec<(usize, UnitIndex)>,
     /// Units that explode at the end of this loop.
     pub(super) exploding: Vec<usize>,
-    /// Where units are about to be.
-    pub(super) steps: Steps,
+    /// The living on the ground, and those above it.
+    pub(super) planes: [Plane; 2],
+    /// The living of each team, with the radii that ranges are measured from.
+    pub(super) targets: [Discs; 2],
     /// What does not move aside for the walker at hand.
     pub(super) obstacles: Vec<Obstacle>,
-    /// Units that can be in each other's way.
-    pub(super) neighbours: Neighbours,
 }
 
 impl Battle {
@@ -169,8 +169,12 @@ impl Battle {
         make_room(&mut self.scratch.obstacles, units);
         self.scratch.destination.resize(units, None);
         self.scratch.footing.resize(units, Footing::Standing);
-        self.scratch.steps.resize(units);
-        self.scratch.neighbours.reserve(units);
+        for targets in &mut self.scratch.targets {
+            targets.reserve(units);
+        }
+        for plane in &mut self.scratch.planes {
+            plane.reserve(units);
+        }
     }
 }
 

@@ -30,6 +30,7 @@ impl Battle {
             self.scratch.destination[index] = None;
             if !self.state.units[index].is_alive() {
                 self.scratch.footing[index] = Footing::Gone;
+                self.state.units[index].pace = 0.0;
                 continue;
             }
             let kind = usize::from(self.state.units[index].kind);

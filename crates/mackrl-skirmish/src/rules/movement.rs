@@ -8,7 +8,15 @@
 //! would lead back, it goes straight on and pushes; friends that fight give way a little. Walkers push idle friends aside, and
 //! enemies block each other.
 
-use crate::{rules::Battle, terrain::Terrain};
+use crate::{
+    rules::{
+        Battle, Team,
+        combat::small,
+        neighbours::{Discs, LANES, Places},
+    },
+    terrain::Terrain,
+    unit_types::Layer,
+};
 
 /// How firmly a unit stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,13 +31,15 @@ pub(super) enum Footing {
     Braced,
 }
 
-/// Where units are about to be, and how they are pushed.
+/// Who can be in whose way: those of the same plane.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Steps {
-    pub(super) x: Vec<f32>,
-    pub(super) y: Vec<f32>,
-    push_x: Vec<f32>,
-    push_y: Vec<f32>,
+pub(super) struct Plane {
+    /// Where its living units are about to be.
+    crowd: Discs,
+    /// What blocks walkers of either team, where it stood at the loop's beginning.
+    blockers: [Discs; 2],
+    /// How each unit, by its index, is pushed in a round.
+    pushes: Vec<[f32; 2]>,
 }
 
 /// Something that does not move aside for a walker.
@@ -72,51 +82,90 @@ const TANGENT_TOLERANCE: f32 = 2e-3;
 /// Overlap in map units that is left alone.
 const OVERLAP_TOLERANCE: f32 = 1e-3;
 
-impl Steps {
-    pub(super) fn resize(&mut self, units: usize) {
-        self.x.resize(units, 0.0);
-        self.y.resize(units, 0.0);
-        self.push_x.resize(units, 0.0);
-        self.push_y.resize(units, 0.0);
+impl Plane {
+    pub(super) fn reserve(&mut self, units: usize) {
+        self.crowd.reserve(units);
+        self.blockers
+            .iter_mut()
+            .for_each(|blockers| blockers.reserve(units));
+        self.pushes.resize(units, [0.0; 2]);
+    }
+
+    fn clear(&mut self) {
+        self.crowd.clear();
+        self.blockers.iter_mut().for_each(Discs::clear);
     }
 }
 
 impl Battle {
     /// Moves every walker by one loop and resolves what overlaps.
     pub(super) fn walk(&mut self) {
-        self.scratch.neighbours.refresh(&self.field, &self.state);
-        self.scratch.steps.x.copy_from_slice(&self.state.x);
-        self.scratch.steps.y.copy_from_slice(&self.state.y);
-        for index in 0..self.state.units.len() {
-            match self.scratch.destination[index] {
-                Some(to) => self.step_forward(index, to),
-                None => self.state.units[index].pace = 0.0,
+        self.gather();
+        for plane in 0..self.scratch.planes.len() {
+            self.step_forward_all(plane);
+            for _ in 0..PUSH_ROUNDS {
+                if !self.push_apart(plane) {
+                    break;
+                }
             }
+            self.settle(plane);
         }
-        for _ in 0..PUSH_ROUNDS {
-            if !self.push_apart() {
-                break;
-            }
-        }
-        self.settle();
     }
 
     /// Pushes everybody apart, as they stand, and off the walls, in so many rounds at most.
     pub(super) fn part(&mut self, rounds: usize) {
         for _ in 0..rounds {
-            self.scratch.neighbours.refresh(&self.field, &self.state);
-            self.scratch.steps.x.copy_from_slice(&self.state.x);
-            self.scratch.steps.y.copy_from_slice(&self.state.y);
-            let overlapped = self.push_apart();
-            self.settle();
+            self.gather();
+            let mut overlapped = false;
+            for plane in 0..self.scratch.planes.len() {
+                overlapped |= self.push_apart(plane);
+                self.settle(plane);
+            }
             if !overlapped {
                 break;
             }
         }
     }
 
-    /// One walker's step, computed from the positions at the loop's beginning.
-    fn step_forward(&mut self, index: usize, to: [f32; 2]) {
+    /// Sorts the living by planes.
+    fn gather(&mut self) {
+        let (state, scratch) = (&self.state, &mut self.scratch);
+        scratch.planes.iter_mut().for_each(Plane::clear);
+        for (index, unit) in state.units.iter().enumerate() {
+            let footing = scratch.footing[index];
+            if !unit.is_alive() || footing == Footing::Gone {
+                continue;
+            }
+            let profile = &self.field.profiles[usize::from(unit.kind)];
+            let plane = &mut scratch.planes[usize::from(profile.layer != Layer::Ground)];
+            let (position, radius) = ([state.x[index], state.y[index]], profile.separation_radius);
+            plane.crowd.push(small(index), position, radius);
+            for team in [Team::Ally, Team::Enemy] {
+                if blocks(footing, team == unit.team) {
+                    plane.blockers[team as usize].push(small(index), position, radius);
+                }
+            }
+        }
+    }
+
+    fn step_forward_all(&mut self, plane: usize) {
+        for row in 0..self.scratch.planes[plane].crowd.rows().len() {
+            for place in 0..self.scratch.planes[plane].crowd.held(row) {
+                let unit = usize::from(self.scratch.planes[plane].crowd.rows()[row].unit[place]);
+                let Some(to) = self.scratch.destination[unit] else {
+                    self.state.units[unit].pace = 0.0;
+                    continue;
+                };
+                if let Some([x, y]) = self.step_forward(plane, unit, to) {
+                    let row = &mut self.scratch.planes[plane].crowd.rows_mut()[row];
+                    (row.x[place], row.y[place]) = (x, y);
+                }
+            }
+        }
+    }
+
+    /// Where a walker's step leads, computed from the positions at the loop's beginning; `None` if it is where it wants to be.
+    fn step_forward(&mut self, plane: usize, index: usize, to: [f32; 2]) -> Option<[f32; 2]> {
         let (x, y) = (self.state.x[index], self.state.y[index]);
         let profile = &self.field.profiles[usize::from(self.state.units[index].kind)];
         let [to_x, to_y] = match self.field.terrain.for_layer(profile.layer) {
@@ -126,22 +175,21 @@ impl Battle {
         let (dx, dy) = (to_x - x, to_y - y);
         let distance = (dx * dx + dy * dy).sqrt();
         if distance == 0.0 {
-            return;
+            return None;
         }
         let unit = &mut self.state.units[index];
         unit.pace = (unit.pace + profile.acceleration).min(profile.speed);
         let stride = unit.pace.min(distance);
         let ahead = [dx / distance, dy / distance];
-        let [way_x, way_y] = self.way_round(index, Wish { ahead, distance });
-        self.scratch.steps.x[index] = x + on_grid(way_x * stride);
-        self.scratch.steps.y[index] = y + on_grid(way_y * stride);
+        let [way_x, way_y] = self.way_round(plane, index, Wish { ahead, distance });
+        Some([x + on_grid(way_x * stride), y + on_grid(way_y * stride)])
     }
 
     /// The unit vector along which a walker goes: towards its destination if nothing blocks it, else round what does, on the side
     /// where that is less of a turn; if both are equal, towards greater y. If either side would turn it back it goes straight on
     /// and pushes. All obstacles are looked at before a side is chosen, so that the order of units is of no consequence.
-    fn way_round(&mut self, index: usize, wish: Wish) -> [f32; 2] {
-        let is_free = self.note_obstacles(index, wish);
+    fn way_round(&mut self, plane: usize, index: usize, wish: Wish) -> [f32; 2] {
+        let is_free = self.note_obstacles(plane, index, wish);
         let unit = &mut self.state.units[index];
         unit.detour_loops = unit.detour_loops.saturating_sub(1);
         if is_free {
@@ -166,87 +214,103 @@ impl Battle {
     }
 
     /// Lists what stands near a walker and does not move aside for it; returns whether its straight way is free.
-    fn note_obstacles(&mut self, index: usize, wish: Wish) -> bool {
+    fn note_obstacles(&mut self, plane: usize, index: usize, wish: Wish) -> bool {
         let (state, scratch) = (&self.state, &mut self.scratch);
-        let neighbours = &scratch.neighbours;
-        let (x, y) = (state.x[index], state.y[index]);
+        let unit = &state.units[index];
+        let radius = self.field.profiles[usize::from(unit.kind)].separation_radius;
+        let [x, y] = [state.x[index], state.y[index]];
         let mut is_free = true;
         scratch.obstacles.clear();
-        for &other in neighbours.of(index) {
-            let other = usize::from(other);
-            if !blocks(scratch.footing[other], neighbours.are_friends(index, other)) {
-                continue;
-            }
-            let obstacle = Obstacle {
-                toward: [state.x[other] - x, state.y[other] - y],
-                touch: neighbours.touch(index, other),
-            };
-            if obstacle.is_near() && !wish.leads_to(&obstacle) {
-                is_free &= !obstacle.obstructs(wish.ahead);
-                scratch.obstacles.push(obstacle);
+        for row in scratch.planes[plane].blockers[unit.team as usize].rows() {
+            let reaches = row.reaches_squared(radius, LOOKAHEAD);
+            for place in Places::of_less(row.squares([x, y]), reaches) {
+                let obstacle = Obstacle {
+                    toward: [row.x[place] - x, row.y[place] - y],
+                    touch: radius + row.radius[place],
+                };
+                if !wish.leads_to(&obstacle) {
+                    is_free &= !obstacle.obstructs(wish.ahead);
+                    scratch.obstacles.push(obstacle);
+                }
             }
         }
         is_free
     }
 
-    /// Pushes overlapping units apart once; returns whether any overlapped.
-    fn push_apart(&mut self) -> bool {
-        let (neighbours, steps) = (&self.scratch.neighbours, &mut self.scratch.steps);
-        let footing = &self.scratch.footing;
+    /// Pushes overlapping units of a plane apart once; returns whether any overlapped.
+    fn push_apart(&mut self, plane: usize) -> bool {
+        let Plane { crowd, pushes, .. } = &mut self.scratch.planes[plane];
+        let (footing, units) = (&self.scratch.footing, &self.state.units);
+        let rows = crowd.rows();
         let mut overlapped = false;
-        for i in 0..footing.len() {
-            if footing[i] == Footing::Gone {
-                continue;
-            }
-            let (x, y) = (steps.x[i], steps.y[i]);
-            for &j in neighbours.after(i) {
-                let j = usize::from(j);
-                let (dx, dy) = (steps.x[j] - x, steps.y[j] - y);
-                let touch = neighbours.touch(i, j);
-                let square = dx * dx + dy * dy;
-                let slack = touch - OVERLAP_TOLERANCE;
-                if square < slack * slack && footing[j] != Footing::Gone {
-                    if !overlapped {
-                        steps.push_x.fill(0.0);
-                        steps.push_y.fill(0.0);
-                        overlapped = true;
+        for (number, row) in rows.iter().enumerate() {
+            for place in 0..crowd.held(number) {
+                let (x, y) = (row.x[place], row.y[place]);
+                let (i, radius) = (usize::from(row.unit[place]), row.radius[place]);
+                for (ahead, other) in rows[number..].iter().enumerate() {
+                    let squares = other.squares([x, y]);
+                    let slacks = other.reaches_squared(radius, -OVERLAP_TOLERANCE);
+                    let mut touching = Places::of_less(squares, slacks);
+                    if ahead == 0 {
+                        touching = touching.after(place);
                     }
-                    let shares = shares(footing[i], footing[j], neighbours.are_friends(i, j));
-                    steps.share_out([i, j], [dx, dy], touch - square.sqrt(), shares);
+                    for other_place in touching {
+                        overlapped = true;
+                        let j = usize::from(other.unit[other_place]);
+                        let are_friends = units[i].team == units[j].team;
+                        let [push_i, push_j] = parting(
+                            [other.x[other_place] - x, other.y[other_place] - y],
+                            radius + other.radius[other_place],
+                            shares(footing[i], footing[j], are_friends),
+                        );
+                        pushes[i][0] -= push_i[0];
+                        pushes[i][1] -= push_i[1];
+                        pushes[j][0] += push_j[0];
+                        pushes[j][1] += push_j[1];
+                    }
                 }
             }
         }
         if overlapped {
-            for (position, push) in steps.x.iter_mut().zip(&steps.push_x) {
-                *position += push.clamp(-GREATEST_PUSH, GREATEST_PUSH);
+            for row in crowd.rows_mut() {
+                for place in 0..LANES {
+                    let push = &mut pushes[usize::from(row.unit[place])];
+                    row.x[place] += push[0].clamp(-GREATEST_PUSH, GREATEST_PUSH);
+                    row.y[place] += push[1].clamp(-GREATEST_PUSH, GREATEST_PUSH);
+                }
             }
-            for (position, push) in steps.y.iter_mut().zip(&steps.push_y) {
-                *position += push.clamp(-GREATEST_PUSH, GREATEST_PUSH);
-            }
+            pushes.fill([0.0; 2]);
         }
         overlapped
     }
 
     /// Takes the new positions over, off the walls. A walker that a wall stops passes its obstacle on the other side.
-    fn settle(&mut self) {
+    fn settle(&mut self, plane: usize) {
         let state = &mut self.state;
-        for (index, unit) in state.units.iter_mut().enumerate() {
-            let (new_x, new_y) = (self.scratch.steps.x[index], self.scratch.steps.y[index]);
-            if new_x == state.x[index] && new_y == state.y[index] {
-                continue;
+        let crowd = &self.scratch.planes[plane].crowd;
+        for (number, row) in crowd.rows().iter().enumerate() {
+            for place in 0..crowd.held(number) {
+                let index = usize::from(row.unit[place]);
+                let (new_x, new_y) = (row.x[place], row.y[place]);
+                if new_x == state.x[index] && new_y == state.y[index] {
+                    continue;
+                }
+                let unit = &mut state.units[index];
+                let profile = &self.field.profiles[usize::from(unit.kind)];
+                let (x, y) = match self.field.terrain.for_layer(profile.layer) {
+                    Some(terrain) => {
+                        terrain.pushed_out_of_walls(new_x, new_y, profile.inner_radius)
+                    }
+                    None => Terrain::within_map(new_x, new_y),
+                };
+                let back = (x - new_x).abs() + (y - new_y).abs();
+                if unit.detour_loops > 0 && back > 0.5 * profile.speed {
+                    unit.detour = -unit.detour;
+                    unit.detour_loops = 2 * DETOUR_LOOPS;
+                }
+                state.x[index] += on_grid(x - state.x[index]);
+                state.y[index] += on_grid(y - state.y[index]);
             }
-            let profile = &self.field.profiles[usize::from(unit.kind)];
-            let (x, y) = match self.field.terrain.for_layer(profile.layer) {
-                Some(terrain) => terrain.pushed_out_of_walls(new_x, new_y, profile.inner_radius),
-                None => Terrain::within_map(new_x, new_y),
-            };
-            let back = (x - new_x).abs() + (y - new_y).abs();
-            if unit.detour_loops > 0 && back > 0.5 * profile.speed {
-                unit.detour = -unit.detour;
-                unit.detour_loops = 2 * DETOUR_LOOPS;
-            }
-            state.x[index] += on_grid(x - state.x[index]);
-            state.y[index] += on_grid(y - state.y[index]);
         }
     }
 }
@@ -282,13 +346,6 @@ impl Wish {
 }
 
 impl Obstacle {
-    /// Whether a walker takes notice of it.
-    fn is_near(&self) -> bool {
-        let [x, y] = self.toward;
-        let near = self.touch + LOOKAHEAD;
-        x * x + y * y < near * near
-    }
-
     /// Whether it is in the way of a walker that goes along the unit vector `way`.
     fn obstructs(&self, way: [f32; 2]) -> bool {
         let (forward, across) = split(self.toward, way);
@@ -321,27 +378,17 @@ fn split([x, y]: [f32; 2], [along_x, along_y]: [f32; 2]) -> (f32, f32) {
     (x * along_x + y * along_y, along_x * y - along_y * x)
 }
 
-impl Steps {
-    /// Adds what an overlap moves each of two units.
-    fn share_out(
-        &mut self,
-        [i, j]: [usize; 2],
-        [dx, dy]: [f32; 2],
-        overlap: f32,
-        [share_i, share_j]: [f32; 2],
-    ) {
-        let distance = (dx * dx + dy * dy).sqrt();
-        // Units on the very same spot part along y.
-        let (ux, uy) = if distance > 1e-6 {
-            (dx / distance, dy / distance)
-        } else {
-            (0.0, 1.0)
-        };
-        self.push_x[i] -= on_grid(ux * overlap * share_i);
-        self.push_y[i] -= on_grid(uy * overlap * share_i);
-        self.push_x[j] += on_grid(ux * overlap * share_j);
-        self.push_y[j] += on_grid(uy * overlap * share_j);
-    }
+/// What the overlap of two units moves each of them by, the first against `toward`, which leads from it to the second.
+fn parting([dx, dy]: [f32; 2], touch: f32, shares: [f32; 2]) -> [[f32; 2]; 2] {
+    let distance = (dx * dx + dy * dy).sqrt();
+    let overlap = touch - distance;
+    // Units on the very same spot part along y.
+    let (ux, uy) = if distance > 1e-6 {
+        (dx / distance, dy / distance)
+    } else {
+        (0.0, 1.0)
+    };
+    shares.map(|share| [ux, uy].map(|along| on_grid(along * overlap * share)))
 }
 
 /// Whether a unit will not move aside for a walker.

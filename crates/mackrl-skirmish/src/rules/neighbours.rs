@@ -1,185 +1,153 @@
-//! Who is near whom, so that movement does not look at all pairs in every loop.
+//! Who is near whom: discs in rows of eight, so that one look compares a disc with eight others.
 //!
-//! For each unit a list of those that a walker could take notice of within the next loops, in ascending order, and a shorter one of
-//! those of higher indices that it could touch. Lists are renewed when
-//! somebody has moved far enough that they could miss one. They hold more than is near, never less, so that what movement
-//! computes does not depend on when they were renewed: a battle that is restored from its state goes on to the same bits.
+//! Each loop fills its own rows, from positions alone: there is nothing to keep up to date, and nothing that is not in the state.
 
-use crate::{
-    rules::{BattleState, Battlefield, battle::make_room, movement::LOOKAHEAD},
-    unit_types::Layer,
-};
+use crate::rules::{UnitIndex, battle::make_room};
 
-/// Gap beyond which a pair is not listed, on top of the gap that movement asks about.
-const SKIN: f32 = 2.0;
-/// Distance that a unit may have moved before lists are renewed. In the loop that follows it moves by less than 0.25 for its
-/// stride and 2 · 0.1 for pushes, so that it is within half the skin of where it was listed.
-const RENEW_AT: f32 = 0.5;
+/// Discs in a row.
+pub(super) const LANES: usize = 8;
+/// A coordinate far from everything, of places in a row that hold no disc.
+const FAR: f32 = 1e9;
 
-/// Who can be in whose way: those of the same plane.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-enum Plane {
-    #[default]
-    Gone,
-    Ground,
-    High,
+/// A number for each disc of a row.
+pub(super) type Lane = [f32; LANES];
+
+/// Eight discs.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Row {
+    pub(super) x: Lane,
+    pub(super) y: Lane,
+    pub(super) radius: Lane,
+    pub(super) unit: [UnitIndex; LANES],
 }
 
-/// For each unit a list of others, one behind the other.
+/// Discs of some units, in the order in which they were added.
 #[derive(Debug, Clone, Default)]
-struct Lists {
-    list: Vec<u8>,
-    /// Where each unit's list begins; one more than units.
-    begin: Vec<u16>,
+pub(super) struct Discs {
+    rows: Vec<Row>,
+    count: usize,
 }
 
-/// Lists of near units.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Neighbours {
-    /// Those that a walker takes notice of.
-    noticed: Lists,
-    /// Those of higher indices that touch.
-    touching: Lists,
-    listed_x: Vec<f32>,
-    listed_y: Vec<f32>,
-    radius: Vec<f32>,
-    is_enemy: Vec<bool>,
-    /// Per unit: where it is in others' way. The dead are in nobody's.
-    plane: Vec<Plane>,
-    is_valid: bool,
-}
+/// Some places of a row, a bit each; iterates over them from the first on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Places(u32);
 
-impl Neighbours {
-    pub(super) fn reserve(&mut self, units: usize) {
-        self.noticed.reserve(units);
-        self.touching.reserve(units);
-        self.listed_x.resize(units, 0.0);
-        self.listed_y.resize(units, 0.0);
-        self.radius.resize(units, 0.0);
-        self.is_enemy.resize(units, false);
-        self.plane.resize(units, Plane::Gone);
-        self.is_valid = false;
+impl Discs {
+    pub(super) fn reserve(&mut self, discs: usize) {
+        make_room(&mut self.rows, discs.div_ceil(LANES));
     }
 
-    /// Units that `index` could take notice of, ascending.
-    pub(super) fn of(&self, index: usize) -> &[u8] {
-        self.noticed.of(index)
+    pub(super) fn clear(&mut self) {
+        self.rows.clear();
+        self.count = 0;
     }
 
-    /// Units with higher indices that could touch `index`, ascending.
-    pub(super) fn after(&self, index: usize) -> &[u8] {
-        self.touching.of(index)
-    }
-
-    /// Distance between centres at which two units touch.
-    pub(super) fn touch(&self, a: usize, b: usize) -> f32 {
-        self.radius[a] + self.radius[b]
-    }
-
-    /// Whether two units are on the same side.
-    pub(super) fn are_friends(&self, a: usize, b: usize) -> bool {
-        self.is_enemy[a] == self.is_enemy[b]
-    }
-
-    /// Renews the lists if somebody has moved far.
-    pub(super) fn refresh(&mut self, field: &Battlefield, state: &BattleState) {
-        let has_moved_far = |(index, x): (usize, &f32)| {
-            let (dx, dy) = (
-                x - self.listed_x[index],
-                state.y[index] - self.listed_y[index],
-            );
-            dx * dx + dy * dy > RENEW_AT * RENEW_AT
-        };
-        if !self.is_valid || state.x.iter().enumerate().any(has_moved_far) {
-            self.renew(field, state);
+    pub(super) fn push(&mut self, unit: UnitIndex, [x, y]: [f32; 2], radius: f32) {
+        let place = self.count % LANES;
+        if place == 0 {
+            self.rows.push(Row::EMPTY);
         }
+        if let Some(row) = self.rows.last_mut() {
+            row.x[place] = x;
+            row.y[place] = y;
+            row.radius[place] = radius;
+            row.unit[place] = unit;
+        }
+        self.count += 1;
     }
 
-    fn renew(&mut self, field: &Battlefield, state: &BattleState) {
-        self.is_valid = true;
-        self.listed_x.copy_from_slice(&state.x);
-        self.listed_y.copy_from_slice(&state.y);
-        for (index, unit) in state.units.iter().enumerate() {
-            let profile = &field.profiles[usize::from(unit.kind)];
-            self.radius[index] = profile.separation_radius;
-            self.plane[index] = match profile.layer {
-                _ if !unit.is_alive() => Plane::Gone,
-                Layer::Ground => Plane::Ground,
-                Layer::Tall | Layer::Air => Plane::High,
-            };
-            self.is_enemy[index] = unit.team == crate::rules::Team::Enemy;
-        }
-        let (mut noticed, mut touching) = (
-            std::mem::take(&mut self.noticed),
-            std::mem::take(&mut self.touching),
-        );
-        let units = state.units.len();
-        noticed.renew(units, |list, index, end| {
-            let end = self.list_range(list, index, 0..index, LOOKAHEAD, end);
-            self.list_range(list, index, index + 1..units, LOOKAHEAD, end)
-        });
-        touching.renew(units, |list, index, end| {
-            self.list_range(list, index, index + 1..units, 0.0, end)
-        });
-        (self.noticed, self.touching) = (noticed, touching);
+    pub(super) fn rows(&self) -> &[Row] {
+        &self.rows
     }
 
-    /// Lists those of `range` that `gap` separates from `index` at most, in `list` from place `end` on; returns where they end.
-    ///
-    /// Everybody is written, and the place moves on only past those who are near: a branch that cannot be foreseen would cost
-    /// more than the writing.
-    fn list_range(
-        &self,
-        list: &mut [u8],
-        index: usize,
-        range: std::ops::Range<usize>,
-        gap: f32,
-        mut end: usize,
-    ) -> usize {
-        let plane = self.plane[index];
-        if plane == Plane::Gone || range.is_empty() {
-            return end;
-        }
-        let (x, y) = (self.listed_x[index], self.listed_y[index]);
-        let reach = self.radius[index] + gap + SKIN;
-        let others = self.listed_x[range.clone()]
-            .iter()
-            .zip(&self.listed_y[range.clone()])
-            .zip(&self.radius[range.clone()])
-            .zip(&self.plane[range.clone()]);
-        for (other, (((other_x, other_y), radius), other_plane)) in range.zip(others) {
-            let (dx, dy) = (other_x - x, other_y - y);
-            let near = reach + radius;
-            let is_listed = (dx * dx + dy * dy < near * near) & (*other_plane == plane);
-            list[end] = u8::try_from(other).expect("a battle has ≤ 256 units");
-            end += usize::from(is_listed);
-        }
-        end
+    pub(super) fn rows_mut(&mut self) -> &mut [Row] {
+        &mut self.rows
+    }
+
+    /// How many places of row number `row` hold a disc.
+    pub(super) fn held(&self, row: usize) -> usize {
+        (self.count - row * LANES).min(LANES)
     }
 }
 
-impl Lists {
-    fn reserve(&mut self, units: usize) {
-        self.list.resize(units * units, 0);
-        make_room(&mut self.begin, units + 1);
-    }
+impl Row {
+    const EMPTY: Self = Self {
+        x: [FAR; LANES],
+        y: [FAR; LANES],
+        radius: [0.0; LANES],
+        unit: [0; LANES],
+    };
 
-    fn of(&self, index: usize) -> &[u8] {
-        &self.list[usize::from(self.begin[index])..usize::from(self.begin[index + 1])]
-    }
-
-    /// Lists anew: `fill` writes the list of a unit from a place on and returns where it ends.
-    fn renew(&mut self, units: usize, fill: impl Fn(&mut [u8], usize, usize) -> usize) {
-        self.begin.clear();
-        let mut end = 0;
-        for index in 0..units {
-            self.begin.push(short(end));
-            end = fill(&mut self.list, index, end);
+    /// Squares of the distances from a point to the centres.
+    #[inline(always)]
+    pub(super) fn squares(&self, [x, y]: [f32; 2]) -> Lane {
+        let mut dx = [0.0; LANES];
+        for place in 0..LANES {
+            dx[place] = self.x[place] - x;
         }
-        self.begin.push(short(end));
+        let mut dy = [0.0; LANES];
+        for place in 0..LANES {
+            dy[place] = self.y[place] - y;
+        }
+        let mut squares = [0.0; LANES];
+        for place in 0..LANES {
+            squares[place] = dx[place] * dx[place] + dy[place] * dy[place];
+        }
+        squares
+    }
+
+    /// Squares of `radius` + the discs' radii + `gap`.
+    #[inline(always)]
+    pub(super) fn reaches_squared(&self, radius: f32, gap: f32) -> Lane {
+        let mut squares = [0.0; LANES];
+        for place in 0..LANES {
+            let reach = radius + self.radius[place] + gap;
+            squares[place] = reach * reach;
+        }
+        squares
     }
 }
 
-fn short(length: usize) -> u16 {
-    u16::try_from(length).expect("256 units have fewer than 65 536 ordered pairs")
+impl Places {
+    /// Places at which `a` is less than `b`. The sign of the difference tells exactly that, and all signs are found at once.
+    #[inline(always)]
+    pub(super) fn of_less(a: Lane, b: Lane) -> Self {
+        let mut differences = [0; LANES];
+        for place in 0..LANES {
+            differences[place] = (a[place] - b[place]).to_bits();
+        }
+        // Mostly there are none.
+        if differences.iter().fold(0, |all, bits| all | bits) >> 31 == 0 {
+            return Self(0);
+        }
+        let mut places = 0;
+        for (place, bits) in differences.iter().enumerate() {
+            places |= (bits >> 31) << place;
+        }
+        Self(places)
+    }
+
+    /// Those that are not in `other`.
+    pub(super) fn without(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
+    }
+
+    /// Those behind `place`.
+    pub(super) fn after(self, place: usize) -> Self {
+        Self(self.0 & (!1 << place))
+    }
+}
+
+impl Iterator for Places {
+    type Item = usize;
+
+    #[inline]
+    fn next(&mut self) -> Option<usize> {
+        let place = self.0.trailing_zeros() as usize % LANES;
+        if self.0 == 0 {
+            return None;
+        }
+        self.0 &= self.0 - 1;
+        Some(place)
+    }
 }

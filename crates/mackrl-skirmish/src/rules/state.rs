@@ -135,6 +135,17 @@ pub struct BattleState {
     pub blows: Vec<Blow>,
 }
 
+impl Team {
+    /// The side that this one fights.
+    #[must_use]
+    pub const fn other(self) -> Self {
+        match self {
+            Self::Ally => Self::Enemy,
+            Self::Enemy => Self::Ally,
+        }
+    }
+}
+
 impl Unit {
     /// Whether it lives.
     #[must_use]
