@@ -28,6 +28,8 @@ pub(super) struct Scratch {
     pub(super) hits: Vec<Hit>,
     /// Healers and their patients in this loop.
     pub(super) treatments: Vec<(usize, usize)>,
+    /// Units that have looked for a quarry in this loop and found none.
+    pub(super) idle: Vec<usize>,
     /// Units that come to help a friend in this loop, and whom they fight.
     pub(super) supports: Vec<(usize, UnitIndex)>,
     /// Units that explode at the end of this loop.
@@ -165,6 +167,7 @@ impl Battle {
         make_room(&mut self.scratch.hits, 4 * units);
         make_room(&mut self.scratch.exploding, units);
         make_room(&mut self.scratch.treatments, units);
+        make_room(&mut self.scratch.idle, units);
         make_room(&mut self.scratch.supports, units);
         make_room(&mut self.scratch.obstacles, units);
         self.scratch.destination.resize(units, None);

@@ -49,6 +49,11 @@ pub(super) struct Obstacle {
     toward: [f32; 2],
     /// Distance between centres at which the two touch.
     touch: f32,
+    /// The unit vector to its centre.
+    centre: [f32; 2],
+    /// Sine and cosine of the angle between its centre and a way that just touches it.
+    sine: f32,
+    cosine: f32,
 }
 
 /// A walker's wish: the unit vector to its destination and the distance.
@@ -224,15 +229,21 @@ impl Battle {
         for row in scratch.planes[plane].blockers[unit.team as usize].rows() {
             let reaches = row.reaches_squared(radius, LOOKAHEAD);
             for place in Places::of_less(row.squares([x, y]), reaches) {
-                let obstacle = Obstacle {
-                    toward: [row.x[place] - x, row.y[place] - y],
-                    touch: radius + row.radius[place],
-                };
+                let obstacle = Obstacle::new(
+                    [row.x[place] - x, row.y[place] - y],
+                    radius + row.radius[place],
+                );
                 if !wish.leads_to(&obstacle) {
                     is_free &= !obstacle.obstructs(wish.ahead);
                     scratch.obstacles.push(obstacle);
                 }
             }
+        }
+        if !is_free {
+            scratch
+                .obstacles
+                .iter_mut()
+                .for_each(Obstacle::find_tangents);
         }
         is_free
     }
@@ -327,12 +338,17 @@ impl Wish {
     fn turned(&self, obstacles: &[Obstacle], side: f32) -> Option<([f32; 2], f32)> {
         let mut way = self.ahead;
         for _ in 0..TURNS {
-            let tangents = obstacles
-                .iter()
-                .filter(|obstacle| obstacle.obstructs(way))
-                .map(|obstacle| obstacle.tangent(side))
-                .map(|tangent| (tangent, split(tangent, way).0));
-            let Some((farthest, _)) = tangents.min_by(|a, b| a.1.total_cmp(&b.1)) else {
+            let mut farthest: Option<([f32; 2], f32)> = None;
+            for obstacle in obstacles {
+                if obstacle.obstructs(way) {
+                    let tangent = obstacle.tangent(side);
+                    let (cosine, _) = split(tangent, way);
+                    if farthest.is_none_or(|(_, least)| cosine.total_cmp(&least).is_lt()) {
+                        farthest = Some((tangent, cosine));
+                    }
+                }
+            }
+            let Some((farthest, _)) = farthest else {
                 return Some((way, split(way, self.ahead).0));
             };
             way = farthest;
@@ -352,14 +368,29 @@ impl Obstacle {
         forward > 0.0 && across.abs() < self.touch - TANGENT_TOLERANCE
     }
 
-    /// The unit vector that passes it on one side and just touches it; at a right angle to it for a walker that touches it.
-    fn tangent(&self, side: f32) -> [f32; 2] {
+    /// An obstacle whose tangents are still to be found.
+    fn new(toward: [f32; 2], touch: f32) -> Self {
+        Self {
+            toward,
+            touch,
+            centre: [0.0; 2],
+            sine: 0.0,
+            cosine: 0.0,
+        }
+    }
+
+    fn find_tangents(&mut self) {
         let [x, y] = self.toward;
         let distance = (x * x + y * y).max(1e-12).sqrt();
-        let sine = (self.touch / distance).min(1.0);
-        let cosine = (1.0 - sine * sine).max(0.0).sqrt();
-        let (x, y, sine) = (x / distance, y / distance, sine * side);
-        [x * cosine - y * sine, y * cosine + x * sine]
+        self.centre = [x / distance, y / distance];
+        self.sine = (self.touch / distance).min(1.0);
+        self.cosine = (1.0 - self.sine * self.sine).max(0.0).sqrt();
+    }
+
+    /// The unit vector that passes it on one side and just touches it; at a right angle to it for a walker that touches it.
+    fn tangent(&self, side: f32) -> [f32; 2] {
+        let ([x, y], sine) = (self.centre, self.sine * side);
+        [x * self.cosine - y * sine, y * self.cosine + x * sine]
     }
 }
 

@@ -127,9 +127,16 @@ impl Places {
         Self(places)
     }
 
-    /// Those that are not in `other`.
-    pub(super) fn without(self, other: Self) -> Self {
-        Self(self.0 & !other.0)
+    /// Places at which `a` is not less than `b`.
+    #[inline(always)]
+    pub(super) fn of_not_less(a: Lane, b: Lane) -> Self {
+        let Self(less) = Self::of_less(a, b);
+        Self(!less & ((1 << LANES) - 1))
+    }
+
+    /// Those that are in both.
+    pub(super) fn and(self, other: Self) -> Self {
+        Self(self.0 & other.0)
     }
 
     /// Those behind `place`.

@@ -37,9 +37,19 @@ impl Battle {
             );
             if unit.stance == Stance::Aggressive && unit.is_alive() && is_free {
                 self.choose_quarry(index);
+                self.note_idleness(index);
             }
         }
         self.support_friends();
+    }
+
+    /// Notes a unit that has just looked and found nobody.
+    fn note_idleness(&mut self, index: usize) {
+        let unit = &self.state.units[index];
+        let has_just_looked = unit.rescan == RESCAN_LOOPS && unit.swing.is_none();
+        if has_just_looked && unit.quarry.is_none() && unit.order != Order::Hunt {
+            self.scratch.idle.push(index);
+        }
     }
 
     /// Lists the living of each team.
@@ -58,23 +68,13 @@ impl Battle {
     /// Lets those who have just looked and found nobody help friends near them that fight. That comes after everybody's own
     /// choice, so that the order of units in the arrays is of no consequence.
     fn support_friends(&mut self) {
-        if self.state.units.iter().all(|unit| unit.quarry.is_none()) {
-            return;
-        }
-        for index in 0..self.state.units.len() {
-            let unit = &self.state.units[index];
-            let has_just_looked = unit.rescan == RESCAN_LOOPS && unit.swing.is_none();
-            let is_free = matches!(unit.order, Order::AttackMove { .. } | Order::Stop);
-            let is_idle = unit.quarry.is_none() && unit.stance == Stance::Aggressive;
-            if has_just_looked
-                && is_free
-                && is_idle
-                && unit.is_alive()
-                && let Some(quarry) = self.quarry_to_support(index)
-            {
+        for number in 0..self.scratch.idle.len() {
+            let index = self.scratch.idle[number];
+            if let Some(quarry) = self.quarry_to_support(index) {
                 self.scratch.supports.push((index, quarry));
             }
         }
+        self.scratch.idle.clear();
         for number in 0..self.scratch.supports.len() {
             let (index, quarry) = self.scratch.supports[number];
             self.engage(index, quarry);
@@ -136,20 +136,21 @@ impl Battle {
     /// The nearest unit that a friend near `index` fights.
     fn quarry_to_support(&self, index: usize) -> Option<UnitIndex> {
         let team = self.state.units[index].team;
+        let position = [self.state.x[index], self.state.y[index]];
         let mut nearest = Nearest::default();
-        for (friend, unit) in self.state.units.iter().enumerate() {
-            if self.state.distance_squared(index, friend) > SUPPORT_RADIUS * SUPPORT_RADIUS {
-                continue;
-            }
-            let Some(quarry) = unit.quarry.map(usize::from) else {
-                continue;
-            };
-            let is_near = unit.team == team && unit.is_alive();
-            // What a healer has chosen is a friend.
-            let is_enemy = self.state.units[quarry].team != team;
-            if is_near && is_enemy && self.can_attack(index, quarry) {
-                let square = self.state.distance_squared(index, quarry);
-                nearest.consider(quarry, square, self.state.y[quarry]);
+        for row in self.scratch.targets[team as usize].rows() {
+            let squares = row.squares(position);
+            for place in Places::of_not_less([SUPPORT_RADIUS * SUPPORT_RADIUS; LANES], squares) {
+                let friend = &self.state.units[usize::from(row.unit[place])];
+                let Some(quarry) = friend.quarry.map(usize::from) else {
+                    continue;
+                };
+                // What a healer has chosen is a friend.
+                let is_enemy = self.state.units[quarry].team != team;
+                if is_enemy && self.can_attack(index, quarry) {
+                    let square = self.state.distance_squared(index, quarry);
+                    nearest.consider(quarry, square, self.state.y[quarry]);
+                }
             }
         }
         nearest.unit()
@@ -168,8 +169,8 @@ impl Battle {
             let squares = row.squares(position);
             let mut candidates = Places::of_less(squares, nearest.limits());
             if !anywhere {
-                let too_far = Places::of_less(row.reaches_squared(notice, 0.0), squares);
-                candidates = candidates.without(too_far);
+                let noticed = Places::of_not_less(row.reaches_squared(notice, 0.0), squares);
+                candidates = candidates.and(noticed);
             }
             for place in candidates {
                 let other = usize::from(row.unit[place]);
