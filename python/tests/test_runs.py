@@ -56,6 +56,28 @@ def test_metrics_are_arrays_of_one_length(runs: dict[str, mackrl.Run]) -> None:
     assert runs["3m"].config()["run"]["steps_env"] == SHORT["steps"]
 
 
+def test_a_run_that_is_not_what_it_was_is_refused(runs: dict[str, mackrl.Run], tmp_path: Path) -> None:
+    def exchanged(name: str, content: bytes) -> Path:
+        folder = tmp_path / name
+        shutil.copytree(runs["3m"].folder, folder)
+        (folder / name).write_bytes(content)
+        return folder
+
+    other = mackrl.train("3m", out=tmp_path / "other", seed=2, **SHORT)  # type: ignore[arg-type]
+    weights = exchanged("weights.safetensors", (other.folder / "weights.safetensors").read_bytes())
+    run = mackrl.Run(weights)
+    for use in (run.team, lambda: mackrl.policy.load(weights), lambda: run.evaluate(1), run.replay):
+        with pytest.raises(ValueError, match="weights.safetensors is not what run.json says"):
+            use()
+    metrics = (runs["3m"].folder / "metrics.jsonl").read_bytes()
+    with pytest.raises(ValueError, match="metrics.jsonl is not what run.json says"):
+        mackrl.Run(exchanged("metrics.jsonl", metrics[: metrics.index(b"\n") + 1])).metrics()
+    config = (runs["3m"].folder / "config.toml").read_bytes()
+    with pytest.raises(ValueError, match="config.toml is not what run.json says"):
+        mackrl.Run(exchanged("config.toml", config.replace(b"seed = 1", b"seed = 2")))
+    assert runs["3m"].metrics() and runs["3m"].team()
+
+
 def test_progress_is_told_and_a_listener_may_end_the_run(tmp_path: Path) -> None:
     told: list[mackrl.Progress] = []
     kept = {name: value for name, value in SHORT.items() if name != "progress"}
