@@ -101,9 +101,11 @@ def test_progress_is_told_and_a_listener_may_end_the_run(tmp_path: Path) -> None
 def test_ctrl_c_leaves_a_run_that_goes_on_as_if_never_stopped(tmp_path: Path) -> None:
     script = f"""
 import mackrl, os, signal, sys, threading
-threading.Timer(0.4, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+begun = threading.Event()
+threading.Thread(target=lambda: begun.wait() and os.kill(os.getpid(), signal.SIGINT)).start()
 try:
-    mackrl.train("3m", preset="paper-code", algorithm="mackrl", steps=6000, out=sys.argv[1], progress=False)
+    mackrl.train("3m", preset="paper-code", algorithm="mackrl", steps=12000, out=sys.argv[1],
+                 progress=lambda progress: progress.steps > 0 and begun.set())
 except KeyboardInterrupt:
     print("interrupted")
 """
@@ -115,7 +117,7 @@ except KeyboardInterrupt:
     with pytest.raises(FileExistsError, match="unfinished run"):
         mackrl.train("3m", out=stopped, progress=False)
     run.resume(progress=False)
-    whole = mackrl.train("3m", preset="paper-code", algorithm="mackrl", steps=6000, out=tmp_path / "whole", progress=False)
+    whole = mackrl.train("3m", preset="paper-code", algorithm="mackrl", steps=12000, out=tmp_path / "whole", progress=False)
     weights = [(one.folder / "weights.safetensors").read_bytes() for one in (run, whole)]
     assert weights[0] == weights[1]
 
