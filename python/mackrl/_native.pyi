@@ -22,6 +22,8 @@ __all__ = [
     "replay_steps",
     "replay_summary",
     "resume",
+    "run_description",
+    "run_rows",
     "skirmish_layout",
     "train",
 ]

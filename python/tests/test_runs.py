@@ -56,6 +56,16 @@ def test_metrics_are_arrays_of_one_length(runs: dict[str, mackrl.Run]) -> None:
     assert runs["3m"].config()["run"]["steps_env"] == SHORT["steps"]
 
 
+@pytest.mark.skipif(not Path(PROGRAM).exists(), reason="the program is not built: `cargo build`, or set MACKRL_PROGRAM")
+def test_a_default_run_is_that_of_the_program(default_runs: dict[str, mackrl.Run], tmp_path: Path) -> None:
+    out, ours = tmp_path / "program", default_runs["2s3z"].folder
+    command = [PROGRAM, "train", "--map=2s3z", "--steps=1500", "--set=test.episodes=4", f"--out={out}"]
+    subprocess.run(command, check=True, capture_output=True)
+    for name in ("config.toml", "weights.safetensors"):
+        assert (out / name).read_bytes() == (ours / name).read_bytes(), name
+    assert timeless(out / "metrics.jsonl") == timeless(ours / "metrics.jsonl")
+
+
 def test_a_run_that_is_not_what_it_was_is_refused(runs: dict[str, mackrl.Run], tmp_path: Path) -> None:
     def exchanged(name: str, content: bytes) -> Path:
         folder = tmp_path / name
