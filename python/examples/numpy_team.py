@@ -3,7 +3,7 @@
     python numpy_team.py RUN
 
 plays an episode with the team of the run folder, computes the tables of all levels here, and says how far they are from those of the
-library (less than a millionth).
+library (less than a millionth). Which partition is in force follows from the shared seed, and is asked of the library.
 """
 
 from __future__ import annotations
@@ -22,28 +22,43 @@ def sigmoid(x: np.ndarray) -> np.ndarray:
     return 1 / (1 + np.exp(-x))
 
 
+def normalised(rows: np.ndarray) -> np.ndarray:
+    """Rows of mean 0 and variance 1."""
+    centred = rows - rows.mean(axis=1, keepdims=True)
+    return centred / np.sqrt((centred**2).mean(axis=1, keepdims=True) + 1e-5)
+
+
 class Controllers:
     """The controllers of one level: Linear and ReLU, a gated recurrent unit, Linear, softmax over what is available."""
 
     def __init__(self, described: dict[str, Any], weights: dict[str, np.ndarray]) -> None:
+        thin = [name for name, _ in described["inputs"] if name.startswith("thin_")]
+        if thin:
+            raise ValueError(f"the {described['name']} reads {thin[0]}, which this example does not compute")
         self.__dict__.update(described)
         self.weights = {
             name.removeprefix(f"{self.name}."): tensor.astype(np.float64)
             for name, tensor in weights.items()
             if name.startswith(f"{self.name}.")
         }
-        self.memory = np.zeros((len(self.groups), self.hidden))
+        self.remembered = np.zeros((len(self.groups), self.hidden))
+
+    def forget(self, formed: list[list[int]]) -> None:
+        """What is remembered of groups that are not formed, after a step, where that is all that counts."""
+        if self.memory == "while-formed":
+            self.remembered[[group not in formed for group in self.groups]] = 0
 
     def step(self, inputs: np.ndarray, masks: np.ndarray, exploration: float) -> np.ndarray:
         """Probabilities [G, C] from inputs [G, I]; 0 where a mask [G, C] is false."""
         w = self.weights
-        x = np.maximum(inputs @ w["input.weight"].T + w["input.bias"], 0)
+        scaled = normalised if self.normalised else lambda rows: rows
+        x = scaled(np.maximum(scaled(inputs) @ w["input.weight"].T + w["input.bias"], 0))
         i_r, i_z, i_n = np.split(x @ w["gru.weight_ih"].T + w["gru.bias_ih"], 3, axis=1)
-        h_r, h_z, h_n = np.split(self.memory @ w["gru.weight_hh"].T + w["gru.bias_hh"], 3, axis=1)
+        h_r, h_z, h_n = np.split(self.remembered @ w["gru.weight_hh"].T + w["gru.bias_hh"], 3, axis=1)
         update = sigmoid(i_z + h_z)
         new = np.tanh(i_n + sigmoid(i_r + h_r) * h_n)
-        self.memory = (1 - update) * new + update * self.memory
-        logits = self.memory @ w["output.weight"].T + w["output.bias"]
+        self.remembered = (1 - update) * new + update * self.remembered
+        logits = self.remembered @ w["output.weight"].T + w["output.bias"]
         logits = np.where(masks, logits, -np.inf)
         softmax = np.exp(logits - logits.max(axis=1, keepdims=True))
         softmax /= softmax.sum(axis=1, keepdims=True)
@@ -56,18 +71,23 @@ class NumpyTeam:
 
     def __init__(self, file: bytes, env: mackrl.VectorEnv) -> None:
         weights, metadata = read_weights(file)
-        assert metadata["format"] == "mackrl/1", metadata.get("format")
+        if metadata.get("format") != "mackrl/2":
+            raise ValueError(f"the file of weights has the format {metadata.get('format')}, expected mackrl/2")
         self.spec, self.env = json.loads(metadata["spec"]), env
         self.levels = [Controllers(level, weights) for level in json.loads(metadata["controllers"])]
         self.last_actions = np.zeros((self.spec["agents"], self.spec["actions"]))
 
-    def tables(self, shown: mackrl.Buffers, exploration: float = 0.0) -> dict[str, np.ndarray]:
-        """The probabilities of every learned level at the next step of world 0."""
-        tables = {}
+    def tables(
+        self, shown: mackrl.Buffers, partitions: list[list[list[int]]], exploration: float = 0.0
+    ) -> dict[str, np.ndarray]:
+        """The probabilities of every learned level at the next step of world 0, where ``partitions`` are in force. Of levels that
+        remember while a group is formed, the rows of other groups mean nothing."""
+        tables, formed = {}, [group for partition in partitions for group in partition]
         for level in self.levels:
             rows = [self.row(level, members, shown) for members in level.groups]
             inputs, masks = (np.array(part) for part in zip(*rows, strict=True))
             tables[level.name] = level.step(inputs, masks, exploration)
+            level.forget(formed)
         return tables
 
     def row(self, level: Controllers, members: list[int], shown: mackrl.Buffers) -> tuple[np.ndarray, np.ndarray]:
@@ -93,8 +113,13 @@ class NumpyTeam:
         read["places"] = np.where(knows, places, 0).ravel()
         inputs = np.concatenate([read[name] for name, _ in level.inputs])
         assert len(inputs) == sum(size for _, size in level.inputs)
-        joint = available[0] if len(members) == 1 else np.outer(*available).ravel() if level.joint_actions else []
-        return inputs, np.concatenate([np.ones(level.divisions, bool), joint]).astype(bool)
+        joint = available[0] if len(members) == 1 else np.outer(*available).ravel() if level.joint_actions else np.zeros(0)
+        divide = np.ones(level.divisions)
+        if level.acts == "never":
+            divide *= not joint.any()
+        elif level.acts == "always":
+            joint = np.zeros_like(joint)
+        return inputs, np.concatenate([divide, joint]).astype(bool)
 
     def acted(self, actions: np.ndarray) -> None:
         """Notes what everybody did."""
@@ -112,11 +137,12 @@ def largest_difference(run: str, seed: int = 1) -> float:
     while not over:
         actions = player.act(shown)
         tables = player.tables()
-        for name, mine in own.tables(shown).items():
+        for name, mine in own.tables(shown, tables.partitions).items():
             theirs = tables.levels[name]
             lives = [shown.visible[0, members].any(axis=1).all() for members in theirs.groups]
-            # The choice of the dead is forced; no network decides it.
-            rows = [row for row, alive in enumerate(lives) if alive or len(theirs.groups) == 1]
+            # The choice of the dead is forced; no network decides it. Groups that nothing in force leads to have no numbers.
+            asked = ~np.isnan(theirs.probabilities).any(axis=1)
+            rows = [row for row, alive in enumerate(lives) if asked[row] and (alive or len(theirs.groups) == 1)]
             worst = max(worst, float(np.abs(mine[rows] - theirs.probabilities[rows]).max(initial=0)))
         own.acted(actions[0])
         step = env.step(actions)

@@ -95,19 +95,21 @@ class Run:
     Args:
         folder: where it lies.
 
+    What is read of it is checked: where a finished run is not what it was at its end, such as with the weights of another run, that
+    is a ``ValueError``.
+
     Raises:
         FileNotFoundError: if no run lies there.
     """
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
         self.folder = Path(folder)
-        if not (self.folder / "config.toml").is_file():
-            raise FileNotFoundError(f"{self.folder} is not a run folder: it has no config.toml")
+        _native.run_description(self.folder)
 
     @property
     def status(self) -> str:
         """``"running"``, ``"finished"``, ``"interrupted"`` or ``"failed"``."""
-        status: str = json.loads((self.folder / "run.json").read_text())["status"]
+        status: str = json.loads(_native.run_description(self.folder)[0])
         return status
 
     def resume(self, *, threads: int | None = None, progress: bool | Listener | None = None) -> Run:
@@ -119,18 +121,14 @@ class Run:
     def metrics(self) -> dict[str, NDArray[np.float64]]:
         """Every metric as an array of one length, a number for each row; NaN where a row does not have it. ``t_env`` counts
         environment steps."""
-        rows = self._rows()
+        rows: list[dict[str, Any]] = json.loads(_native.run_rows(self.folder))
         names = dict.fromkeys(name for row in rows for name, value in row.items() if not isinstance(value, str))
         return {name: np.array([row.get(name, math.nan) for row in rows], np.float64) for name in names}
 
-    def _rows(self) -> list[dict[str, Any]]:
-        lines = (self.folder / "metrics.jsonl").read_text().splitlines(keepends=True)
-        # A run that goes on may be in the middle of a line.
-        return [json.loads(line) for line in lines if line.endswith("\n")]
-
     def config(self) -> dict[str, Any]:
         """The whole configuration."""
-        return self.team().config
+        config: dict[str, Any] = json.loads(_native.run_description(self.folder)[1])
+        return config
 
     def team(self) -> Team:
         """The team with its weights: those at the end, or those of the latest checkpoint."""

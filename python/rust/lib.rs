@@ -25,7 +25,7 @@ mod _native {
         own_world::check_world,
         policy::{Agent, Play, Team},
         replays::{record_policy, record_script, replay_page, replay_steps, replay_summary},
-        runs::{evaluate, maps, resume, train},
+        runs::{evaluate, maps, resume, run_description, run_rows, train},
         worlds::{Worlds, skirmish_layout},
     };
 

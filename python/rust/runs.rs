@@ -10,7 +10,7 @@ use std::{
 use mackrl_run::{
     RunError,
     config::Config,
-    run_folder::Run,
+    run_folder::{Run, read_description, read_rows},
     stop_request::StopRequest,
     training::{Episodes, assembly::RunWorld, evaluate_in},
     training_loop::{self, Observer, Standing, Summary},
@@ -181,6 +181,22 @@ pub(crate) fn evaluate(
         Ok(crate::json(&evaluation))
     })
     .map_err(IntoException::into_exception)
+}
+
+/// How far the run at `path` has come, and its configuration, as JSON.
+#[pyfunction]
+pub(crate) fn run_description(py: Python<'_>, path: PathBuf) -> PyResult<(String, String)> {
+    let (config, description) = py
+        .detach(|| read_description(&path))
+        .map_err(IntoException::into_exception)?;
+    Ok((crate::json(&description.status), crate::json(&config)))
+}
+
+/// The rows of metrics of the run at `path`, as JSON.
+#[pyfunction]
+pub(crate) fn run_rows(py: Python<'_>, path: PathBuf) -> PyResult<String> {
+    let rows = py.detach(|| read_rows(&path));
+    Ok(crate::json(&rows.map_err(IntoException::into_exception)?))
 }
 
 /// The maps of the simulator.

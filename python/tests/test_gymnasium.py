@@ -35,7 +35,7 @@ def test_a_team_is_a_tuple_with_one_reward() -> None:
         total, over = total + reward, terminated or truncated
         assert info["illegal"] == 0
     assert total >= 0 and set(info) == {
-        "avail_actions", "state", "battle_won", "dead_allies", "dead_enemies", "illegal",
+        "avail_actions", "state", "battle_won", "timed_out", "dead_allies", "dead_enemies", "illegal",
     }  # fmt: skip
 
 

@@ -82,7 +82,7 @@ def test_infos_have_the_same_keys_from_reset_on_and_hold_numbers_alone() -> None
     env = parallel_env("3m")
     _, infos = env.reset(seed=1)
     keys = set(infos["agent_0"])
-    assert keys == {"battle_won", "dead_allies", "dead_enemies", "illegal"}
+    assert keys == {"battle_won", "timed_out", "dead_allies", "dead_enemies", "illegal"}
     *_, infos = env.step({name: 1 for name in env.agents})
     assert all(set(info) == keys for info in infos.values())
     assert all(isinstance(value, (int, float)) for value in infos["agent_0"].values())

@@ -16,13 +16,17 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
 import numpy_team  # noqa: E402
 
 
+# Of the paper's learner and of the default one.
+TEAMS = [("runs", "3m"), ("runs", "2s3z"), ("default_runs", "3m"), ("default_runs", "2s3z"), ("default_runs", "held")]
+
+
 @pytest.mark.parametrize("exploration", [None, 0.3])
-@pytest.mark.parametrize("name", ["3m", "2s3z"])
+@pytest.mark.parametrize(("trained", "name"), TEAMS)
 def test_agents_alone_act_as_the_team_bit_for_bit(
-    runs: dict[str, mackrl.Run], name: str, exploration: float | None
+    request: pytest.FixtureRequest, trained: str, name: str, exploration: float | None
 ) -> None:
-    team = load(runs[name])
-    env = mackrl.VectorEnv(name, 1, autoreset="disabled", **numpy_team.settings(team.config["env"]))
+    team = load(request.getfixturevalue(trained)[name])
+    env = mackrl.VectorEnv(team.spec.name, 1, autoreset="disabled", **numpy_team.settings(team.config["env"]))
     for episode in range(10):
         shown = env.reset(seed=3, episode=episode)
         central = team.play(seed=3, episode=episode, exploration=exploration)
@@ -76,16 +80,41 @@ def test_a_played_episode_is_that_of_evaluate_and_replay(runs: dict[str, mackrl.
         assert np.array_equal(central.act(shown)[0], recorded)
         assert thought is not None
         tables = central.tables()
-        for pair in thought["pairs"]:
+        for pair in thought.get("pairs", ()):
             assert np.isclose(tables.levels["pair_controller"].of(*pair["members"])[0], pair["delegate"], atol=1e-7)
         for partition, probability in zip(thought["partitions"], tables.levels["pair_selector"].probabilities[0], strict=True):
             assert np.isclose(partition["probability"], probability, atol=1e-7)
         shown = env.step(recorded[None])
 
 
-@pytest.mark.parametrize("name", ["3m", "2s3z"])
-def test_numpy_computes_the_same_probabilities(runs: dict[str, mackrl.Run], name: str) -> None:
-    assert numpy_team.largest_difference(str(runs[name].folder)) < 1e-6
+@pytest.mark.parametrize(("trained", "name"), TEAMS)
+def test_numpy_computes_the_same_probabilities(request: pytest.FixtureRequest, trained: str, name: str) -> None:
+    run = request.getfixturevalue(trained)[name]
+    assert numpy_team.largest_difference(str(run.folder)) < 1e-6
+
+
+def test_a_pair_of_the_default_team_has_a_row_while_it_is_formed(default_runs: dict[str, mackrl.Run]) -> None:
+    team = load(default_runs["held"])
+    env = mackrl.VectorEnv("3m", autoreset="disabled", **numpy_team.settings(team.config["env"]))
+    shown, central = env.reset(seed=1), team.play(seed=1)
+    formed = []
+    for _ in range(6):
+        shown = env.step(central.act(shown))
+        tables = central.tables()
+        (partition,) = tables.partitions
+        pairs = tables.levels["pair_controller"]
+        known = [not np.isnan(row).any() for row in pairs.probabilities]
+        assert known == [pair in partition for pair in pairs.groups] and sum(known) == 1
+        formed.append(partition)
+    assert formed[0] == formed[1] == formed[2] != formed[3] == formed[4] == formed[5]
+
+
+def test_numpy_refuses_what_it_does_not_compute(runs: dict[str, mackrl.Run]) -> None:
+    file = (runs["3m"].folder / "weights.safetensors").read_bytes()
+    with pytest.raises(ValueError, match="has the format mackrl/1, expected mackrl/2"):
+        numpy_team.NumpyTeam(file.replace(b"mackrl/2", b"mackrl/1"), mackrl.VectorEnv("3m"))
+    with pytest.raises(ValueError, match="pair_selector reads thin_enemies, which this example does not compute"):
+        numpy_team.Controllers({"name": "pair_selector", "inputs": [["thin_enemies", 18]]}, {})
 
 
 def test_tables_are_distributions(runs: dict[str, mackrl.Run]) -> None:
@@ -110,7 +139,7 @@ def test_tables_are_distributions(runs: dict[str, mackrl.Run]) -> None:
 def test_a_file_of_weights_describes_itself(runs: dict[str, mackrl.Run]) -> None:
     team = load(runs["3m"])
     described = team.metadata
-    assert described["format"] == "mackrl/1" and described["algorithm"] == "mackrl" and described["map"] == "3m"
+    assert described["format"] == "mackrl/2" and described["algorithm"] == "mackrl" and described["map"] == "3m"
     assert len(described["map_sha256"]) == len(described["config_sha256"]) == 64
     assert json.loads(described["spec"])["agents"] == 3
     assert float(described["trained_steps_env"]) >= 600 and 0 <= float(described["exploration"]) <= 1
@@ -120,7 +149,17 @@ def test_a_file_of_weights_describes_itself(runs: dict[str, mackrl.Run]) -> None
     central.act(mackrl.VectorEnv("3m").reset(seed=1))
     assert central.tables().partitions == partitions
     for level in json.loads(described["controllers"]):
+        assert level["memory"] == "episode" and level["normalised"] is False
         name, hidden = level["name"], level["hidden"]
         assert team.weights[f"{name}.input.weight"].shape == (hidden, sum(size for _, size in level["inputs"]))
         outputs = level["divisions"] + level["joint_actions"]
         assert team.weights[f"{name}.output.weight"].shape == (outputs, hidden)
+
+
+def test_a_file_of_a_default_team_describes_itself(default_runs: dict[str, mackrl.Run]) -> None:
+    controllers = json.loads(load(default_runs["2s3z"]).metadata["controllers"])
+    described = [(level["name"], level["memory"], level["normalised"], level["acts"]) for level in controllers]
+    assert described == [
+        ("pair_controller", "while-formed", True, "learned"),
+        ("agent_controller", "episode", True, "never"),
+    ]

@@ -56,6 +56,38 @@ def test_metrics_are_arrays_of_one_length(runs: dict[str, mackrl.Run]) -> None:
     assert runs["3m"].config()["run"]["steps_env"] == SHORT["steps"]
 
 
+@pytest.mark.skipif(not Path(PROGRAM).exists(), reason="the program is not built: `cargo build`, or set MACKRL_PROGRAM")
+def test_a_default_run_is_that_of_the_program(default_runs: dict[str, mackrl.Run], tmp_path: Path) -> None:
+    out, ours = tmp_path / "program", default_runs["2s3z"].folder
+    command = [PROGRAM, "train", "--map=2s3z", "--steps=1500", "--set=test.episodes=4", f"--out={out}"]
+    subprocess.run(command, check=True, capture_output=True)
+    for name in ("config.toml", "weights.safetensors"):
+        assert (out / name).read_bytes() == (ours / name).read_bytes(), name
+    assert timeless(out / "metrics.jsonl") == timeless(ours / "metrics.jsonl")
+
+
+def test_a_run_that_is_not_what_it_was_is_refused(runs: dict[str, mackrl.Run], tmp_path: Path) -> None:
+    def exchanged(name: str, content: bytes) -> Path:
+        folder = tmp_path / name
+        shutil.copytree(runs["3m"].folder, folder)
+        (folder / name).write_bytes(content)
+        return folder
+
+    other = mackrl.train("3m", out=tmp_path / "other", seed=2, **SHORT)  # type: ignore[arg-type]
+    weights = exchanged("weights.safetensors", (other.folder / "weights.safetensors").read_bytes())
+    run = mackrl.Run(weights)
+    for use in (run.team, lambda: mackrl.policy.load(weights), lambda: run.evaluate(1), run.replay):
+        with pytest.raises(ValueError, match="weights.safetensors is not what run.json says"):
+            use()
+    metrics = (runs["3m"].folder / "metrics.jsonl").read_bytes()
+    with pytest.raises(ValueError, match="metrics.jsonl is not what run.json says"):
+        mackrl.Run(exchanged("metrics.jsonl", metrics[: metrics.index(b"\n") + 1])).metrics()
+    config = (runs["3m"].folder / "config.toml").read_bytes()
+    with pytest.raises(ValueError, match="config.toml is not what run.json says"):
+        mackrl.Run(exchanged("config.toml", config.replace(b"seed = 1", b"seed = 2")))
+    assert runs["3m"].metrics() and runs["3m"].team()
+
+
 def test_progress_is_told_and_a_listener_may_end_the_run(tmp_path: Path) -> None:
     told: list[mackrl.Progress] = []
     kept = {name: value for name, value in SHORT.items() if name != "progress"}
@@ -79,9 +111,11 @@ def test_progress_is_told_and_a_listener_may_end_the_run(tmp_path: Path) -> None
 def test_ctrl_c_leaves_a_run_that_goes_on_as_if_never_stopped(tmp_path: Path) -> None:
     script = f"""
 import mackrl, os, signal, sys, threading
-threading.Timer(0.4, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+begun = threading.Event()
+threading.Thread(target=lambda: begun.wait() and os.kill(os.getpid(), signal.SIGINT)).start()
 try:
-    mackrl.train("3m", preset="paper-code", algorithm="mackrl", steps=6000, out=sys.argv[1], progress=False)
+    mackrl.train("3m", preset="paper-code", algorithm="mackrl", steps=12000, out=sys.argv[1],
+                 progress=lambda progress: progress.steps > 0 and begun.set())
 except KeyboardInterrupt:
     print("interrupted")
 """
@@ -93,7 +127,7 @@ except KeyboardInterrupt:
     with pytest.raises(FileExistsError, match="unfinished run"):
         mackrl.train("3m", out=stopped, progress=False)
     run.resume(progress=False)
-    whole = mackrl.train("3m", preset="paper-code", algorithm="mackrl", steps=6000, out=tmp_path / "whole", progress=False)
+    whole = mackrl.train("3m", preset="paper-code", algorithm="mackrl", steps=12000, out=tmp_path / "whole", progress=False)
     weights = [(one.folder / "weights.safetensors").read_bytes() for one in (run, whole)]
     assert weights[0] == weights[1]
 

@@ -51,7 +51,7 @@ use manifest::{Fingerprint, Growing};
 pub use record::Status;
 use record::{RunRecord, build, read_record};
 pub use recorded::{Recorded, timeless};
-pub use rows::{Following, Row, follow_rows};
+pub use rows::{Following, Row, follow_rows, read_rows};
 pub use stored::Run;
 pub(crate) use stored::{Completeness, StoredRun};
 

@@ -144,6 +144,17 @@ impl StoredRun {
     }
 }
 
+/// Reads the rows of metrics of the run at `path`, in their order.
+///
+/// # Errors
+/// [`RunError::NotARun`] if there is none, [`RunError::BadData`] with the first row that cannot be one of it, or if it is finished and
+/// its configuration or its metrics are not those that it ended with.
+pub fn read_rows(path: &Path) -> Result<Vec<Row>> {
+    let mut rows = Vec::new();
+    StoredRun::open(path)?.rows(|row| rows.push(row))?;
+    Ok(rows)
+}
+
 /// Rows from some place in the metrics on, for one who follows a run as it goes.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Following {

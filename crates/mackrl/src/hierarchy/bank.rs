@@ -91,7 +91,10 @@ impl Bank {
             hidden,
             divisions: level.divisions,
             joint_actions: outputs - level.divisions,
+            acts: level.acts,
             explores: level.explores,
+            memory: level.memory,
+            normalised: self.normalises,
         }
     }
 

@@ -237,8 +237,14 @@ pub struct ControllerDescription {
     pub divisions: usize,
     /// Joint actions, which follow them: of members (i, j) column i·A + j.
     pub joint_actions: usize,
+    /// When its groups divide, where they may act jointly.
+    pub acts: Option<Delegation>,
     /// Whether exploration is mixed into its choices.
     pub explores: bool,
+    /// How long its controllers remember.
+    pub memory: Memory,
+    /// Whether a row of inputs, and one of the first layer's outputs after `ReLU`, is normalised: `(x − μ) / √(σ² + 1e-5)`.
+    pub normalised: bool,
 }
 
 /// Names one controller: its level's name, and whose it is.

@@ -12,6 +12,7 @@
 mod declared;
 
 use mackrl_env::{Action, AgentId, Draw, EpisodeKey, declare_words};
+use serde::Serialize;
 
 use crate::partition::{Partition, PartitionBuffer, Partitions};
 
@@ -56,7 +57,8 @@ pub enum Reads {
 }
 
 /// How long a group's controller remembers what it read.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Memory {
     /// From the first step of the episode on, whether the group is chosen or not.
     #[default]
