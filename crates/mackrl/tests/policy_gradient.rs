@@ -162,7 +162,7 @@ fn the_gradient_of_many_short_episodes_is_that_of_their_log_probability() {
 #[test]
 fn the_gradient_of_a_hierarchy_with_fours_is_that_of_its_log_probability() {
     let subject = check(
-        Team::fours(&["env.map=2s3z"], 5),
+        Team::fours(&["env.map=2s3z"], 6),
         3,
         1e-2,
         Replay::Recomputed,
