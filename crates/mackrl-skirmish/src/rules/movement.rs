@@ -11,8 +11,9 @@
 use crate::{
     rules::{
         Battle, Team,
+        battle::make_room,
         combat::small,
-        neighbours::{Discs, LANES, Places},
+        neighbours::{ALL, BEHIND, Discs, LANES, Lane, Places},
     },
     terrain::Terrain,
     unit_types::Layer,
@@ -42,18 +43,27 @@ pub(super) struct Plane {
     pushes: Vec<[f32; 2]>,
 }
 
-/// Something that does not move aside for a walker.
+/// What does not move aside for a walker, in rows of eight.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Obstacles {
+    rows: Vec<ObstacleRow>,
+    count: usize,
+}
+
+/// Eight obstacles.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Obstacle {
-    /// From the walker to its centre.
-    toward: [f32; 2],
-    /// Distance between centres at which the two touch.
-    touch: f32,
-    /// The unit vector to its centre.
-    centre: [f32; 2],
-    /// Sine and cosine of the angle between its centre and a way that just touches it.
-    sine: f32,
-    cosine: f32,
+struct ObstacleRow {
+    /// From the walker to their centres.
+    x: Lane,
+    y: Lane,
+    /// Distances between centres at which the two touch.
+    touch: Lane,
+    /// The unit vectors to their centres.
+    centre_x: Lane,
+    centre_y: Lane,
+    /// Sines and cosines of the angles between their centres and ways that just touch them.
+    sine: Lane,
+    cosine: Lane,
 }
 
 /// A walker's wish: the unit vector to its destination and the distance.
@@ -224,28 +234,21 @@ impl Battle {
         let unit = &state.units[index];
         let radius = self.field.profiles[usize::from(unit.kind)].separation_radius;
         let [x, y] = [state.x[index], state.y[index]];
-        let mut is_free = true;
         scratch.obstacles.clear();
         for row in scratch.planes[plane].blockers[unit.team as usize].rows() {
             let reaches = row.reaches_squared(radius, LOOKAHEAD);
             for place in Places::of_less(row.squares([x, y]), reaches) {
-                let obstacle = Obstacle::new(
-                    [row.x[place] - x, row.y[place] - y],
-                    radius + row.radius[place],
-                );
-                if !wish.leads_to(&obstacle) {
-                    is_free &= !obstacle.obstructs(wish.ahead);
-                    scratch.obstacles.push(obstacle);
+                let toward = [row.x[place] - x, row.y[place] - y];
+                if !wish.leads_to(toward) {
+                    scratch.obstacles.push(toward, radius + row.radius[place]);
                 }
             }
         }
-        if !is_free {
-            scratch
-                .obstacles
-                .iter_mut()
-                .for_each(Obstacle::find_tangents);
+        if scratch.obstacles.are_free(wish.ahead) {
+            return true;
         }
-        is_free
+        scratch.obstacles.find_tangents();
+        false
     }
 
     /// Pushes overlapping units of a plane apart once; returns whether any overlapped.
@@ -258,13 +261,12 @@ impl Battle {
             for place in 0..crowd.held(number) {
                 let (x, y) = (row.x[place], row.y[place]);
                 let (i, radius) = (usize::from(row.unit[place]), row.radius[place]);
-                for (ahead, other) in rows[number..].iter().enumerate() {
+                let mut mask = &BEHIND[place];
+                for other in &rows[number..] {
                     let squares = other.squares([x, y]);
                     let slacks = other.reaches_squared(radius, -OVERLAP_TOLERANCE);
-                    let mut touching = Places::of_less(squares, slacks);
-                    if ahead == 0 {
-                        touching = touching.after(place);
-                    }
+                    let touching = Places::of_less_among(mask, squares, slacks);
+                    mask = &ALL;
                     for other_place in touching {
                         overlapped = true;
                         let j = usize::from(other.unit[other_place]);
@@ -327,21 +329,21 @@ impl Battle {
 }
 
 impl Wish {
-    /// Whether an obstacle is the destination itself.
-    fn leads_to(&self, obstacle: &Obstacle) -> bool {
-        let (forward, across) = split(obstacle.toward, self.ahead);
+    /// Whether what is so far from the walker is the destination itself.
+    fn leads_to(&self, toward: [f32; 2]) -> bool {
+        let (forward, across) = split(toward, self.ahead);
         forward >= self.distance - 1e-3 && across.abs() < 1e-3
     }
 
     /// The first free way when turning to one side, left with 1 and right with −1, with the cosine of the turn: at each obstacle
     /// the tangent that turns the most, until nothing is in the way. `None` if that turns back.
-    fn turned(&self, obstacles: &[Obstacle], side: f32) -> Option<([f32; 2], f32)> {
+    fn turned(&self, obstacles: &Obstacles, side: f32) -> Option<([f32; 2], f32)> {
         let mut way = self.ahead;
         for _ in 0..TURNS {
             let mut farthest: Option<([f32; 2], f32)> = None;
-            for obstacle in obstacles {
-                if obstacle.obstructs(way) {
-                    let tangent = obstacle.tangent(side);
+            for row in &obstacles.rows {
+                for place in row.obstructing(way) {
+                    let tangent = row.tangent(place, side);
                     let (cosine, _) = split(tangent, way);
                     if farthest.is_none_or(|(_, least)| cosine.total_cmp(&least).is_lt()) {
                         farthest = Some((tangent, cosine));
@@ -361,36 +363,95 @@ impl Wish {
     }
 }
 
-impl Obstacle {
-    /// Whether it is in the way of a walker that goes along the unit vector `way`.
-    fn obstructs(&self, way: [f32; 2]) -> bool {
-        let (forward, across) = split(self.toward, way);
-        forward > 0.0 && across.abs() < self.touch - TANGENT_TOLERANCE
+impl Obstacles {
+    pub(super) fn reserve(&mut self, obstacles: usize) {
+        make_room(&mut self.rows, obstacles.div_ceil(LANES));
     }
 
-    /// An obstacle whose tangents are still to be found.
-    fn new(toward: [f32; 2], touch: f32) -> Self {
-        Self {
-            toward,
-            touch,
-            centre: [0.0; 2],
-            sine: 0.0,
-            cosine: 0.0,
+    fn clear(&mut self) {
+        self.rows.clear();
+        self.count = 0;
+    }
+
+    fn push(&mut self, [x, y]: [f32; 2], touch: f32) {
+        let place = self.count % LANES;
+        if place == 0 {
+            self.rows.push(ObstacleRow::EMPTY);
         }
+        if let Some(row) = self.rows.last_mut() {
+            row.x[place] = x;
+            row.y[place] = y;
+            row.touch[place] = touch;
+        }
+        self.count += 1;
+    }
+
+    /// Whether none is in the way.
+    fn are_free(&self, way: [f32; 2]) -> bool {
+        self.rows.iter().all(|row| row.obstructing(way).is_empty())
     }
 
     fn find_tangents(&mut self) {
-        let [x, y] = self.toward;
-        let distance = (x * x + y * y).max(1e-12).sqrt();
-        self.centre = [x / distance, y / distance];
-        self.sine = (self.touch / distance).min(1.0);
-        self.cosine = (1.0 - self.sine * self.sine).max(0.0).sqrt();
+        self.rows.iter_mut().for_each(ObstacleRow::find_tangents);
+    }
+}
+
+impl ObstacleRow {
+    /// Places without an obstacle: what has no size is never in the way.
+    const EMPTY: Self = Self {
+        x: [0.0; LANES],
+        y: [0.0; LANES],
+        touch: [0.0; LANES],
+        centre_x: [0.0; LANES],
+        centre_y: [0.0; LANES],
+        sine: [0.0; LANES],
+        cosine: [0.0; LANES],
+    };
+
+    /// Those in the way of a walker that goes along the unit vector `way`.
+    #[inline(always)]
+    fn obstructing(&self, way: [f32; 2]) -> Places {
+        let mut behind = [0.0; LANES];
+        let mut aside = [0.0; LANES];
+        let mut passing = [0.0; LANES];
+        for place in 0..LANES {
+            behind[place] = 0.0 - (self.x[place] * way[0] + self.y[place] * way[1]);
+        }
+        for place in 0..LANES {
+            aside[place] = (way[0] * self.y[place] - way[1] * self.x[place]).abs();
+        }
+        for place in 0..LANES {
+            passing[place] = self.touch[place] - TANGENT_TOLERANCE;
+        }
+        Places::of_negative_and_less(behind, aside, passing)
     }
 
-    /// The unit vector that passes it on one side and just touches it; at a right angle to it for a walker that touches it.
-    fn tangent(&self, side: f32) -> [f32; 2] {
-        let ([x, y], sine) = (self.centre, self.sine * side);
-        [x * self.cosine - y * sine, y * self.cosine + x * sine]
+    fn find_tangents(&mut self) {
+        let mut distance = [0.0; LANES];
+        for place in 0..LANES {
+            let (x, y) = (self.x[place], self.y[place]);
+            distance[place] = (x * x + y * y).max(1e-12).sqrt();
+        }
+        for place in 0..LANES {
+            self.centre_x[place] = self.x[place] / distance[place];
+        }
+        for place in 0..LANES {
+            self.centre_y[place] = self.y[place] / distance[place];
+        }
+        for place in 0..LANES {
+            self.sine[place] = (self.touch[place] / distance[place]).min(1.0);
+        }
+        for place in 0..LANES {
+            let sine = self.sine[place];
+            self.cosine[place] = (1.0 - sine * sine).max(0.0).sqrt();
+        }
+    }
+
+    /// The unit vector that passes one on one side and just touches it; at a right angle to it for a walker that touches it.
+    fn tangent(&self, place: usize, side: f32) -> [f32; 2] {
+        let (x, y) = (self.centre_x[place], self.centre_y[place]);
+        let (sine, cosine) = (self.sine[place] * side, self.cosine[place]);
+        [x * cosine - y * sine, y * cosine + x * sine]
     }
 }
 

@@ -12,6 +12,26 @@ const FAR: f32 = 1e9;
 /// A number for each disc of a row.
 pub(super) type Lane = [f32; LANES];
 
+/// Some places of a row: all bits of theirs are set.
+pub(super) type Mask = [u32; LANES];
+
+/// All places.
+pub(super) const ALL: Mask = [u32::MAX; LANES];
+/// The places behind each.
+pub(super) const BEHIND: [Mask; LANES] = {
+    let mut masks = [[0; LANES]; LANES];
+    let mut place = 0;
+    while place < LANES {
+        let mut behind = place + 1;
+        while behind < LANES {
+            masks[place][behind] = u32::MAX;
+            behind += 1;
+        }
+        place += 1;
+    }
+    masks
+};
+
 /// Eight discs.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {
@@ -109,19 +129,42 @@ impl Row {
 }
 
 impl Places {
-    /// Places at which `a` is less than `b`. The sign of the difference tells exactly that, and all signs are found at once.
+    /// Places at which `a` is less than `b`.
     #[inline(always)]
     pub(super) fn of_less(a: Lane, b: Lane) -> Self {
+        Self::of_less_among(&ALL, a, b)
+    }
+
+    /// Places among those of a mask at which `a` is less than `b`. The sign of the difference tells exactly that, and all signs
+    /// are found at once.
+    #[inline(always)]
+    pub(super) fn of_less_among(mask: &Mask, a: Lane, b: Lane) -> Self {
         let mut differences = [0; LANES];
         for place in 0..LANES {
-            differences[place] = (a[place] - b[place]).to_bits();
+            differences[place] = (a[place] - b[place]).to_bits() & mask[place];
         }
+        Self::of_signs(differences)
+    }
+
+    /// Places at which `negative` is below 0 and `a` is less than `b`.
+    #[inline(always)]
+    pub(super) fn of_negative_and_less(negative: Lane, a: Lane, b: Lane) -> Self {
+        let mut signs = [0; LANES];
+        for place in 0..LANES {
+            signs[place] = negative[place].to_bits() & (a[place] - b[place]).to_bits();
+        }
+        Self::of_signs(signs)
+    }
+
+    /// Places of numbers whose first bit is set.
+    #[inline(always)]
+    fn of_signs(numbers: Mask) -> Self {
         // Mostly there are none.
-        if differences.iter().fold(0, |all, bits| all | bits) >> 31 == 0 {
+        if numbers.iter().fold(0, |all, bits| all | bits) >> 31 == 0 {
             return Self(0);
         }
         let mut places = 0;
-        for (place, bits) in differences.iter().enumerate() {
+        for (place, bits) in numbers.iter().enumerate() {
             places |= (bits >> 31) << place;
         }
         Self(places)
@@ -134,14 +177,13 @@ impl Places {
         Self(!less & ((1 << LANES) - 1))
     }
 
+    pub(super) fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
     /// Those that are in both.
     pub(super) fn and(self, other: Self) -> Self {
         Self(self.0 & other.0)
-    }
-
-    /// Those behind `place`.
-    pub(super) fn after(self, place: usize) -> Self {
-        Self(self.0 & (!1 << place))
     }
 }
 
