@@ -5,8 +5,9 @@ use std::sync::Arc;
 use crate::rules::{
     BattleState, Battlefield, Chance, Order, Stance, Team, Unit, UnitIndex,
     combat::Hit,
-    movement::{Footing, Obstacles, Plane, on_grid},
+    movement::{Footing, Plane, on_grid},
     neighbours::Discs,
+    obstacles::Obstacles,
 };
 
 /// A battle: what changes, on what does not.

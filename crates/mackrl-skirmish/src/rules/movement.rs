@@ -11,9 +11,9 @@
 use crate::{
     rules::{
         Battle, Team,
-        battle::make_room,
         combat::small,
-        neighbours::{ALL, BEHIND, Discs, LANES, Lane, Places},
+        neighbours::{ALL, BEHIND, Discs, Places},
+        obstacles::Wish,
     },
     terrain::Terrain,
     unit_types::Layer,
@@ -43,44 +43,9 @@ pub(super) struct Plane {
     pushes: Vec<[f32; 2]>,
 }
 
-/// What does not move aside for a walker, in rows of eight.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Obstacles {
-    rows: Vec<ObstacleRow>,
-    count: usize,
-}
-
-/// Eight obstacles.
-#[derive(Debug, Clone, Copy)]
-struct ObstacleRow {
-    /// From the walker to their centres.
-    x: Lane,
-    y: Lane,
-    /// Distances between centres at which the two touch.
-    touch: Lane,
-    /// The unit vectors to their centres.
-    centre_x: Lane,
-    centre_y: Lane,
-    /// Sines and cosines of the angles between their centres and ways that just touch them.
-    sine: Lane,
-    cosine: Lane,
-}
-
-/// A walker's wish: the unit vector to its destination and the distance.
-#[derive(Debug, Clone, Copy)]
-struct Wish {
-    ahead: [f32; 2],
-    distance: f32,
-}
-
 /// Gap to an obstacle, in map units, at which a walker begins to step round it. With 0.5 a walker sees only the neighbour that it
 /// runs into: stalkers and zealots then surround a team that stands sooner, in 42.6 steps, 42.9 here and 43.1 in recorded runs.
-pub(super) const LOOKAHEAD: f32 = 2.0;
-/// Cosine of the greatest turn round obstacles, 105°. Walkers that turn back further, up to 127°, run about behind their own
-/// front: 24 zerglings take 4 steps longer; with 90° stalkers and zealots surround a team that stands a step too soon.
-const LEAST_COSINE: f32 = -0.266;
-/// Obstacles that a walker goes round in one turn, at most.
-const TURNS: usize = 8;
+const LOOKAHEAD: f32 = 2.0;
 /// How readily those who fight give way to walking friends, where walkers do with 1. Without it 8 marines that stand last 25.1
 /// steps, 24.0 in recorded runs, and 25 marines at random 3 steps longer; more of it changes little.
 const FIGHTERS_READINESS: f32 = 0.4;
@@ -92,8 +57,6 @@ const PUSH_ROUNDS: usize = 2;
 const GREATEST_PUSH: f32 = 0.070_312_5;
 /// Difference of cosines below which two turns are equal: rounding differs on the two sides of the map, and must not decide.
 const EQUAL_TURNS: f32 = 1e-3;
-/// Map units by which a tangent may cut an obstacle.
-const TANGENT_TOLERANCE: f32 = 2e-3;
 /// Overlap in map units that is left alone.
 const OVERLAP_TOLERANCE: f32 = 1e-3;
 
@@ -258,10 +221,10 @@ impl Battle {
         let rows = crowd.rows();
         let mut overlapped = false;
         for (number, row) in rows.iter().enumerate() {
-            for place in 0..crowd.held(number) {
+            for (place, behind) in BEHIND.iter().enumerate().take(crowd.held(number)) {
                 let (x, y) = (row.x[place], row.y[place]);
                 let (i, radius) = (usize::from(row.unit[place]), row.radius[place]);
-                let mut mask = &BEHIND[place];
+                let mut mask = behind;
                 for other in &rows[number..] {
                     let squares = other.squares([x, y]);
                     let slacks = other.reaches_squared(radius, -OVERLAP_TOLERANCE);
@@ -285,8 +248,10 @@ impl Battle {
             }
         }
         if overlapped {
-            for row in crowd.rows_mut() {
-                for place in 0..LANES {
+            for number in 0..crowd.rows().len() {
+                let held = crowd.held(number);
+                let row = &mut crowd.rows_mut()[number];
+                for place in 0..held {
                     let push = &mut pushes[usize::from(row.unit[place])];
                     row.x[place] += push[0].clamp(-GREATEST_PUSH, GREATEST_PUSH);
                     row.y[place] += push[1].clamp(-GREATEST_PUSH, GREATEST_PUSH);
@@ -328,133 +293,6 @@ impl Battle {
     }
 }
 
-impl Wish {
-    /// Whether what is so far from the walker is the destination itself.
-    fn leads_to(&self, toward: [f32; 2]) -> bool {
-        let (forward, across) = split(toward, self.ahead);
-        forward >= self.distance - 1e-3 && across.abs() < 1e-3
-    }
-
-    /// The first free way when turning to one side, left with 1 and right with −1, with the cosine of the turn: at each obstacle
-    /// the tangent that turns the most, until nothing is in the way. `None` if that turns back.
-    fn turned(&self, obstacles: &Obstacles, side: f32) -> Option<([f32; 2], f32)> {
-        let mut way = self.ahead;
-        for _ in 0..TURNS {
-            let mut farthest: Option<([f32; 2], f32)> = None;
-            for row in &obstacles.rows {
-                for place in row.obstructing(way) {
-                    let tangent = row.tangent(place, side);
-                    let (cosine, _) = split(tangent, way);
-                    if farthest.is_none_or(|(_, least)| cosine.total_cmp(&least).is_lt()) {
-                        farthest = Some((tangent, cosine));
-                    }
-                }
-            }
-            let Some((farthest, _)) = farthest else {
-                return Some((way, split(way, self.ahead).0));
-            };
-            way = farthest;
-            let (cosine, sine) = split(way, self.ahead);
-            if cosine < LEAST_COSINE || sine * side < 0.0 {
-                return None;
-            }
-        }
-        None
-    }
-}
-
-impl Obstacles {
-    pub(super) fn reserve(&mut self, obstacles: usize) {
-        make_room(&mut self.rows, obstacles.div_ceil(LANES));
-    }
-
-    fn clear(&mut self) {
-        self.rows.clear();
-        self.count = 0;
-    }
-
-    fn push(&mut self, [x, y]: [f32; 2], touch: f32) {
-        let place = self.count % LANES;
-        if place == 0 {
-            self.rows.push(ObstacleRow::EMPTY);
-        }
-        if let Some(row) = self.rows.last_mut() {
-            row.x[place] = x;
-            row.y[place] = y;
-            row.touch[place] = touch;
-        }
-        self.count += 1;
-    }
-
-    /// Whether none is in the way.
-    fn are_free(&self, way: [f32; 2]) -> bool {
-        self.rows.iter().all(|row| row.obstructing(way).is_empty())
-    }
-
-    fn find_tangents(&mut self) {
-        self.rows.iter_mut().for_each(ObstacleRow::find_tangents);
-    }
-}
-
-impl ObstacleRow {
-    /// Places without an obstacle: what has no size is never in the way.
-    const EMPTY: Self = Self {
-        x: [0.0; LANES],
-        y: [0.0; LANES],
-        touch: [0.0; LANES],
-        centre_x: [0.0; LANES],
-        centre_y: [0.0; LANES],
-        sine: [0.0; LANES],
-        cosine: [0.0; LANES],
-    };
-
-    /// Those in the way of a walker that goes along the unit vector `way`.
-    #[inline(always)]
-    fn obstructing(&self, way: [f32; 2]) -> Places {
-        let mut behind = [0.0; LANES];
-        let mut aside = [0.0; LANES];
-        let mut passing = [0.0; LANES];
-        for place in 0..LANES {
-            behind[place] = 0.0 - (self.x[place] * way[0] + self.y[place] * way[1]);
-        }
-        for place in 0..LANES {
-            aside[place] = (way[0] * self.y[place] - way[1] * self.x[place]).abs();
-        }
-        for place in 0..LANES {
-            passing[place] = self.touch[place] - TANGENT_TOLERANCE;
-        }
-        Places::of_negative_and_less(behind, aside, passing)
-    }
-
-    fn find_tangents(&mut self) {
-        let mut distance = [0.0; LANES];
-        for place in 0..LANES {
-            let (x, y) = (self.x[place], self.y[place]);
-            distance[place] = (x * x + y * y).max(1e-12).sqrt();
-        }
-        for place in 0..LANES {
-            self.centre_x[place] = self.x[place] / distance[place];
-        }
-        for place in 0..LANES {
-            self.centre_y[place] = self.y[place] / distance[place];
-        }
-        for place in 0..LANES {
-            self.sine[place] = (self.touch[place] / distance[place]).min(1.0);
-        }
-        for place in 0..LANES {
-            let sine = self.sine[place];
-            self.cosine[place] = (1.0 - sine * sine).max(0.0).sqrt();
-        }
-    }
-
-    /// The unit vector that passes one on one side and just touches it; at a right angle to it for a walker that touches it.
-    fn tangent(&self, place: usize, side: f32) -> [f32; 2] {
-        let (x, y) = (self.centre_x[place], self.centre_y[place]);
-        let (sine, cosine) = (self.sine[place] * side, self.cosine[place]);
-        [x * cosine - y * sine, y * cosine + x * sine]
-    }
-}
-
 /// A displacement of less than 1 024 map units, rounded to a multiple of 2⁻¹² map units, halves to the even one.
 ///
 /// The engine's numbers are fixed-point with that grain. All positions are multiples of it, so that sums and differences of
@@ -463,11 +301,6 @@ pub(super) fn on_grid(displacement: f32) -> f32 {
     // Numbers from 2 048 to 4 096 are that far apart.
     const SHIFT: f32 = 3_072.0;
     (displacement + SHIFT) - SHIFT
-}
-
-/// The parts of a vector along a unit vector and to the left of it.
-fn split([x, y]: [f32; 2], [along_x, along_y]: [f32; 2]) -> (f32, f32) {
-    (x * along_x + y * along_y, along_x * y - along_y * x)
 }
 
 /// What the overlap of two units moves each of them by, the first against `toward`, which leads from it to the second.
