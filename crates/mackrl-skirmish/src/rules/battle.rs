@@ -5,8 +5,9 @@ use std::sync::Arc;
 use crate::rules::{
     BattleState, Battlefield, Chance, Order, Stance, Team, Unit, UnitIndex,
     combat::Hit,
-    movement::{Footing, Obstacle, Plane, on_grid},
+    movement::{Footing, Plane, on_grid},
     neighbours::Discs,
+    obstacles::Obstacles,
 };
 
 /// A battle: what changes, on what does not.
@@ -38,8 +39,10 @@ pub(super) struct Scratch {
     pub(super) planes: [Plane; 2],
     /// The living of each team, with the radii that ranges are measured from.
     pub(super) targets: [Discs; 2],
+    /// Whether they were listed in this loop.
+    pub(super) has_targets: bool,
     /// What does not move aside for the walker at hand.
-    pub(super) obstacles: Vec<Obstacle>,
+    pub(super) obstacles: Obstacles,
 }
 
 impl Battle {
@@ -169,7 +172,7 @@ impl Battle {
         make_room(&mut self.scratch.treatments, units);
         make_room(&mut self.scratch.idle, units);
         make_room(&mut self.scratch.supports, units);
-        make_room(&mut self.scratch.obstacles, units);
+        self.scratch.obstacles.reserve(units);
         self.scratch.destination.resize(units, None);
         self.scratch.footing.resize(units, Footing::Standing);
         for targets in &mut self.scratch.targets {

@@ -14,6 +14,7 @@ mod combat;
 mod healing;
 mod movement;
 mod neighbours;
+mod obstacles;
 mod opponent;
 mod placement;
 mod profile;

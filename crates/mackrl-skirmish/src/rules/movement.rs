@@ -12,7 +12,8 @@ use crate::{
     rules::{
         Battle, Team,
         combat::small,
-        neighbours::{Discs, LANES, Places},
+        neighbours::{ALL, BEHIND, Discs, Places},
+        obstacles::Wish,
     },
     terrain::Terrain,
     unit_types::Layer,
@@ -42,35 +43,9 @@ pub(super) struct Plane {
     pushes: Vec<[f32; 2]>,
 }
 
-/// Something that does not move aside for a walker.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Obstacle {
-    /// From the walker to its centre.
-    toward: [f32; 2],
-    /// Distance between centres at which the two touch.
-    touch: f32,
-    /// The unit vector to its centre.
-    centre: [f32; 2],
-    /// Sine and cosine of the angle between its centre and a way that just touches it.
-    sine: f32,
-    cosine: f32,
-}
-
-/// A walker's wish: the unit vector to its destination and the distance.
-#[derive(Debug, Clone, Copy)]
-struct Wish {
-    ahead: [f32; 2],
-    distance: f32,
-}
-
 /// Gap to an obstacle, in map units, at which a walker begins to step round it. With 0.5 a walker sees only the neighbour that it
 /// runs into: stalkers and zealots then surround a team that stands sooner, in 42.6 steps, 42.9 here and 43.1 in recorded runs.
-pub(super) const LOOKAHEAD: f32 = 2.0;
-/// Cosine of the greatest turn round obstacles, 105°. Walkers that turn back further, up to 127°, run about behind their own
-/// front: 24 zerglings take 4 steps longer; with 90° stalkers and zealots surround a team that stands a step too soon.
-const LEAST_COSINE: f32 = -0.266;
-/// Obstacles that a walker goes round in one turn, at most.
-const TURNS: usize = 8;
+const LOOKAHEAD: f32 = 2.0;
 /// How readily those who fight give way to walking friends, where walkers do with 1. Without it 8 marines that stand last 25.1
 /// steps, 24.0 in recorded runs, and 25 marines at random 3 steps longer; more of it changes little.
 const FIGHTERS_READINESS: f32 = 0.4;
@@ -82,8 +57,6 @@ const PUSH_ROUNDS: usize = 2;
 const GREATEST_PUSH: f32 = 0.070_312_5;
 /// Difference of cosines below which two turns are equal: rounding differs on the two sides of the map, and must not decide.
 const EQUAL_TURNS: f32 = 1e-3;
-/// Map units by which a tangent may cut an obstacle.
-const TANGENT_TOLERANCE: f32 = 2e-3;
 /// Overlap in map units that is left alone.
 const OVERLAP_TOLERANCE: f32 = 1e-3;
 
@@ -224,28 +197,21 @@ impl Battle {
         let unit = &state.units[index];
         let radius = self.field.profiles[usize::from(unit.kind)].separation_radius;
         let [x, y] = [state.x[index], state.y[index]];
-        let mut is_free = true;
         scratch.obstacles.clear();
         for row in scratch.planes[plane].blockers[unit.team as usize].rows() {
             let reaches = row.reaches_squared(radius, LOOKAHEAD);
             for place in Places::of_less(row.squares([x, y]), reaches) {
-                let obstacle = Obstacle::new(
-                    [row.x[place] - x, row.y[place] - y],
-                    radius + row.radius[place],
-                );
-                if !wish.leads_to(&obstacle) {
-                    is_free &= !obstacle.obstructs(wish.ahead);
-                    scratch.obstacles.push(obstacle);
+                let toward = [row.x[place] - x, row.y[place] - y];
+                if !wish.leads_to(toward) {
+                    scratch.obstacles.push(toward, radius + row.radius[place]);
                 }
             }
         }
-        if !is_free {
-            scratch
-                .obstacles
-                .iter_mut()
-                .for_each(Obstacle::find_tangents);
+        if scratch.obstacles.are_free(wish.ahead) {
+            return true;
         }
-        is_free
+        scratch.obstacles.find_tangents();
+        false
     }
 
     /// Pushes overlapping units of a plane apart once; returns whether any overlapped.
@@ -255,16 +221,15 @@ impl Battle {
         let rows = crowd.rows();
         let mut overlapped = false;
         for (number, row) in rows.iter().enumerate() {
-            for place in 0..crowd.held(number) {
+            for (place, behind) in BEHIND.iter().enumerate().take(crowd.held(number)) {
                 let (x, y) = (row.x[place], row.y[place]);
                 let (i, radius) = (usize::from(row.unit[place]), row.radius[place]);
-                for (ahead, other) in rows[number..].iter().enumerate() {
+                let mut mask = behind;
+                for other in &rows[number..] {
                     let squares = other.squares([x, y]);
                     let slacks = other.reaches_squared(radius, -OVERLAP_TOLERANCE);
-                    let mut touching = Places::of_less(squares, slacks);
-                    if ahead == 0 {
-                        touching = touching.after(place);
-                    }
+                    let touching = Places::of_less_among(mask, squares, slacks);
+                    mask = &ALL;
                     for other_place in touching {
                         overlapped = true;
                         let j = usize::from(other.unit[other_place]);
@@ -283,8 +248,10 @@ impl Battle {
             }
         }
         if overlapped {
-            for row in crowd.rows_mut() {
-                for place in 0..LANES {
+            for number in 0..crowd.rows().len() {
+                let held = crowd.held(number);
+                let row = &mut crowd.rows_mut()[number];
+                for place in 0..held {
                     let push = &mut pushes[usize::from(row.unit[place])];
                     row.x[place] += push[0].clamp(-GREATEST_PUSH, GREATEST_PUSH);
                     row.y[place] += push[1].clamp(-GREATEST_PUSH, GREATEST_PUSH);
@@ -326,74 +293,6 @@ impl Battle {
     }
 }
 
-impl Wish {
-    /// Whether an obstacle is the destination itself.
-    fn leads_to(&self, obstacle: &Obstacle) -> bool {
-        let (forward, across) = split(obstacle.toward, self.ahead);
-        forward >= self.distance - 1e-3 && across.abs() < 1e-3
-    }
-
-    /// The first free way when turning to one side, left with 1 and right with −1, with the cosine of the turn: at each obstacle
-    /// the tangent that turns the most, until nothing is in the way. `None` if that turns back.
-    fn turned(&self, obstacles: &[Obstacle], side: f32) -> Option<([f32; 2], f32)> {
-        let mut way = self.ahead;
-        for _ in 0..TURNS {
-            let mut farthest: Option<([f32; 2], f32)> = None;
-            for obstacle in obstacles {
-                if obstacle.obstructs(way) {
-                    let tangent = obstacle.tangent(side);
-                    let (cosine, _) = split(tangent, way);
-                    if farthest.is_none_or(|(_, least)| cosine.total_cmp(&least).is_lt()) {
-                        farthest = Some((tangent, cosine));
-                    }
-                }
-            }
-            let Some((farthest, _)) = farthest else {
-                return Some((way, split(way, self.ahead).0));
-            };
-            way = farthest;
-            let (cosine, sine) = split(way, self.ahead);
-            if cosine < LEAST_COSINE || sine * side < 0.0 {
-                return None;
-            }
-        }
-        None
-    }
-}
-
-impl Obstacle {
-    /// Whether it is in the way of a walker that goes along the unit vector `way`.
-    fn obstructs(&self, way: [f32; 2]) -> bool {
-        let (forward, across) = split(self.toward, way);
-        forward > 0.0 && across.abs() < self.touch - TANGENT_TOLERANCE
-    }
-
-    /// An obstacle whose tangents are still to be found.
-    fn new(toward: [f32; 2], touch: f32) -> Self {
-        Self {
-            toward,
-            touch,
-            centre: [0.0; 2],
-            sine: 0.0,
-            cosine: 0.0,
-        }
-    }
-
-    fn find_tangents(&mut self) {
-        let [x, y] = self.toward;
-        let distance = (x * x + y * y).max(1e-12).sqrt();
-        self.centre = [x / distance, y / distance];
-        self.sine = (self.touch / distance).min(1.0);
-        self.cosine = (1.0 - self.sine * self.sine).max(0.0).sqrt();
-    }
-
-    /// The unit vector that passes it on one side and just touches it; at a right angle to it for a walker that touches it.
-    fn tangent(&self, side: f32) -> [f32; 2] {
-        let ([x, y], sine) = (self.centre, self.sine * side);
-        [x * self.cosine - y * sine, y * self.cosine + x * sine]
-    }
-}
-
 /// A displacement of less than 1 024 map units, rounded to a multiple of 2⁻¹² map units, halves to the even one.
 ///
 /// The engine's numbers are fixed-point with that grain. All positions are multiples of it, so that sums and differences of
@@ -402,11 +301,6 @@ pub(super) fn on_grid(displacement: f32) -> f32 {
     // Numbers from 2 048 to 4 096 are that far apart.
     const SHIFT: f32 = 3_072.0;
     (displacement + SHIFT) - SHIFT
-}
-
-/// The parts of a vector along a unit vector and to the left of it.
-fn split([x, y]: [f32; 2], [along_x, along_y]: [f32; 2]) -> (f32, f32) {
-    (x * along_x + y * along_y, along_x * y - along_y * x)
 }
 
 /// What the overlap of two units moves each of them by, the first against `toward`, which leads from it to the second.

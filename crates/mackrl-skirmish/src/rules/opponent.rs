@@ -28,7 +28,7 @@ const NEARNESS_TOLERANCE: f32 = 1e-3;
 impl Battle {
     /// Lets every living aggressive unit keep, change or find its quarry.
     pub(super) fn choose_quarries(&mut self) {
-        self.list_targets();
+        self.scratch.has_targets = false;
         for index in 0..self.state.units.len() {
             let unit = &self.state.units[index];
             let is_free = matches!(
@@ -52,8 +52,11 @@ impl Battle {
         }
     }
 
-    /// Lists the living of each team.
+    /// Lists the living of each team, once in a loop in which somebody looks.
     fn list_targets(&mut self) {
+        if std::mem::replace(&mut self.scratch.has_targets, true) {
+            return;
+        }
         let (state, targets) = (&self.state, &mut self.scratch.targets);
         targets.iter_mut().for_each(Discs::clear);
         for (index, unit) in state.units.iter().enumerate() {
@@ -70,6 +73,7 @@ impl Battle {
     fn support_friends(&mut self) {
         for number in 0..self.scratch.idle.len() {
             let index = self.scratch.idle[number];
+            self.list_targets();
             if let Some(quarry) = self.quarry_to_support(index) {
                 self.scratch.supports.push((index, quarry));
             }
@@ -98,6 +102,7 @@ impl Battle {
         {
             return;
         }
+        self.list_targets();
         let found = self.nearest_target(index, false);
         let is_chasing = self.state.units[index].quarry.is_some();
         if is_chasing && !found.is_some_and(|other| self.is_in_reach(index, usize::from(other))) {
