@@ -102,7 +102,7 @@ fn no_damage_to_metrics_costs_a_checkpoint() {
                 path,
                 fs::read_to_string(path).unwrap().replace('\n', "\r\n"),
             )
-            .unwrap()
+            .unwrap();
         },
     ];
     for (case, damage) in damages.into_iter().enumerate() {
