@@ -91,11 +91,11 @@ fn browse(folder: &Path, address: &str, width: u32) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
-/// A folder with the page and the playback of an untrained team's battle.
+/// A folder with the page and the playback of an untrained team's battle: that of the paper, whose pairs are selected.
 fn team(folder: &Path, map: &str) -> Playback {
     mackrl(
         folder,
-        &format!("train --map {map} --steps 100 --out run --set test.episodes=1"),
+        &format!("train --map {map} --preset paper --steps 100 --out run --set test.episodes=1"),
     );
     mackrl(
         folder,
