@@ -111,6 +111,7 @@ def test_progress_is_told_and_a_listener_may_end_the_run(tmp_path: Path) -> None
 def test_ctrl_c_leaves_a_run_that_goes_on_as_if_never_stopped(tmp_path: Path) -> None:
     script = f"""
 import mackrl, os, signal, sys, threading
+signal.signal(signal.SIGINT, signal.default_int_handler)  # A shell starts what is in its background without.
 begun = threading.Event()
 threading.Thread(target=lambda: begun.wait() and os.kill(os.getpid(), signal.SIGINT)).start()
 try:

@@ -281,6 +281,7 @@ def test_threads_may_share_worlds() -> None:
 def test_ctrl_c_stops_between_steps_and_worlds_stay_usable() -> None:
     script = """
 import mackrl, os, signal, threading
+signal.signal(signal.SIGINT, signal.default_int_handler)  # A shell starts what is in its background without.
 env = mackrl.VectorEnv("3m", 64)
 env.reset(seed=1)
 threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
