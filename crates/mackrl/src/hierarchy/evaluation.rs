@@ -38,9 +38,23 @@ impl Hierarchy {
         parameters: &Parameters,
         piece: &'a mut Piece,
     ) -> Result<(&'a Experience, &'a mut Activations), Error> {
+        self.present(parameters, piece, Self::recompute)
+    }
+
+    /// The piece's experience and its activations under `parameters`: those that its actor kept, if they serve, else what `recompute`
+    /// makes of them.
+    ///
+    /// # Errors
+    /// [`Error::Data`] if another kind of policy played it.
+    pub(super) fn present<'a>(
+        &self,
+        parameters: &Parameters,
+        piece: &'a mut Piece,
+        recompute: impl FnOnce(&Self, &Parameters, &Experience, &mut Activations),
+    ) -> Result<(&'a Experience, &'a mut Activations), Error> {
         let (experience, activations) = kept(piece)?;
         if !activations.serve(parameters.version()) {
-            self.recompute(parameters, experience, activations);
+            recompute(self, parameters, experience, activations);
         }
         Ok((experience, activations))
     }
@@ -154,7 +168,7 @@ impl Hierarchy {
 }
 
 /// The piece's experience, and what its actor kept of it.
-pub(super) fn kept(piece: &mut Piece) -> Result<(&Experience, &mut Activations), Error> {
+fn kept(piece: &mut Piece) -> Result<(&Experience, &mut Activations), Error> {
     let Piece { experience, actor } = piece;
     let kept = actor
         .cache()

@@ -9,7 +9,6 @@
 use super::{
     Hierarchy, Parts,
     activations::{Activations, BankActivations},
-    evaluation::kept,
 };
 use crate::{
     Error,
@@ -152,11 +151,7 @@ impl Hierarchy {
         parameters: &Parameters,
         piece: &'a mut Piece,
     ) -> Result<(&'a Experience, &'a mut Activations), Error> {
-        let (experience, activations) = kept(piece)?;
-        if !activations.serve(parameters.version()) {
-            self.recompute_networks(parameters, experience, activations);
-        }
-        Ok((experience, activations))
+        self.present(parameters, piece, Self::recompute_networks)
     }
 
     /// Computes all networks on an experience's inputs, without the marginal of the whole team.
