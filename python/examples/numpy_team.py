@@ -58,7 +58,7 @@ class Controllers:
         update = sigmoid(i_z + h_z)
         new = np.tanh(i_n + sigmoid(i_r + h_r) * h_n)
         self.remembered = (1 - update) * new + update * self.remembered
-        logits = self.remembered @ w["output.weight"].T + w["output.bias"]
+        logits = scaled(self.remembered) @ w["output.weight"].T + w["output.bias"]
         logits = np.where(masks, logits, -np.inf)
         softmax = np.exp(logits - logits.max(axis=1, keepdims=True))
         softmax /= softmax.sum(axis=1, keepdims=True)
@@ -71,8 +71,8 @@ class NumpyTeam:
 
     def __init__(self, file: bytes, env: mackrl.VectorEnv) -> None:
         weights, metadata = read_weights(file)
-        if metadata.get("format") != "mackrl/2":
-            raise ValueError(f"the file of weights has the format {metadata.get('format')}, expected mackrl/2")
+        if metadata.get("format") != "mackrl/3":
+            raise ValueError(f"the file of weights has the format {metadata.get('format')}, expected mackrl/3")
         self.spec, self.env = json.loads(metadata["spec"]), env
         self.levels = [Controllers(level, weights) for level in json.loads(metadata["controllers"])]
         self.last_actions = np.zeros((self.spec["agents"], self.spec["actions"]))

@@ -111,8 +111,8 @@ def test_a_pair_of_the_default_team_has_a_row_while_it_is_formed(default_runs: d
 
 def test_numpy_refuses_what_it_does_not_compute(runs: dict[str, mackrl.Run]) -> None:
     file = (runs["3m"].folder / "weights.safetensors").read_bytes()
-    with pytest.raises(ValueError, match="has the format mackrl/1, expected mackrl/2"):
-        numpy_team.NumpyTeam(file.replace(b"mackrl/2", b"mackrl/1"), mackrl.VectorEnv("3m"))
+    with pytest.raises(ValueError, match="has the format mackrl/2, expected mackrl/3"):
+        numpy_team.NumpyTeam(file.replace(b"mackrl/3", b"mackrl/2"), mackrl.VectorEnv("3m"))
     with pytest.raises(ValueError, match="pair_selector reads thin_enemies, which this example does not compute"):
         numpy_team.Controllers({"name": "pair_selector", "inputs": [["thin_enemies", 18]]}, {})
 
@@ -139,7 +139,7 @@ def test_tables_are_distributions(runs: dict[str, mackrl.Run]) -> None:
 def test_a_file_of_weights_describes_itself(runs: dict[str, mackrl.Run]) -> None:
     team = load(runs["3m"])
     described = team.metadata
-    assert described["format"] == "mackrl/2" and described["algorithm"] == "mackrl" and described["map"] == "3m"
+    assert described["format"] == "mackrl/3" and described["algorithm"] == "mackrl" and described["map"] == "3m"
     assert len(described["map_sha256"]) == len(described["config_sha256"]) == 64
     assert json.loads(described["spec"])["agents"] == 3
     assert float(described["trained_steps_env"]) >= 600 and 0 <= float(described["exploration"]) <= 1

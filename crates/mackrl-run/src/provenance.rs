@@ -31,7 +31,8 @@ pub const CODE: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("MACKRL_SOUR
 /// the simulator, no longer gives the same weights.
 ///
 /// 1: mackrl 0.1.0, which drew and learnt with the exponential function of the platform. 2: our own, the same on every machine.
-pub const LEARNING_VERSION: u32 = 3;
+/// 3: the policy loss of the paper's learner over a buffer of fixed size. 4: recurrent states normalised under a clipped surrogate.
+pub const LEARNING_VERSION: u32 = 4;
 
 /// The versions of runs that do not say, which mackrl 0.1.0 made.
 const FIRST: Versions = Versions {

@@ -10,21 +10,24 @@ use mackrl_run::{
 use mackrl_skirmish::SIMULATOR_VERSION;
 use serde_json::{Value, json};
 
-const RUNS: [(&str, &str); 4] = [
-    ("3m", "mackrl"),
-    ("3m", "central-v"),
-    ("2s3z", "mackrl"),
-    ("2s3z", "central-v"),
+/// Preset, map and algorithm.
+const RUNS: [[&str; 3]; 6] = [
+    ["paper-code", "3m", "mackrl"],
+    ["paper-code", "3m", "central-v"],
+    ["paper-code", "2s3z", "mackrl"],
+    ["paper-code", "2s3z", "central-v"],
+    ["default", "3m", "mackrl-ppo"],
+    ["default", "2s3z", "mappo"],
 ];
 
-fn config(map: &str, algorithm: &str) -> Config {
+fn config([preset, map, algorithm]: [&str; 3]) -> Config {
     let settings = [
         format!("env.map={map}"),
         format!("algorithm.name={algorithm}"),
         "run.steps_env=3000".to_owned(),
         "run.seed=1".to_owned(),
     ];
-    let preset = ConfigBuilder::new(&Registry::built_in()).preset("paper-code");
+    let preset = ConfigBuilder::new(&Registry::built_in()).preset(preset);
     let builder = settings
         .iter()
         .try_fold(preset.expect("a shipped preset"), |builder, setting| {
@@ -34,8 +37,8 @@ fn config(map: &str, algorithm: &str) -> Config {
     config.expect("a configuration that can be trained")
 }
 
-fn weights_sha256(map: &str, algorithm: &str) -> String {
-    let mut trainer = Trainer::new(&config(map, algorithm), 2).expect("a run");
+fn weights_sha256(run: [&str; 3]) -> String {
+    let mut trainer = Trainer::new(&config(run), 2).expect("a run");
     while !trainer.finished() {
         trainer.update().expect("the run goes on");
     }
@@ -49,13 +52,14 @@ fn the_same_versions_train_the_same_weights() {
     let golden: Value = serde_json::from_slice(&golden).expect("the golden file is JSON");
     let runs: Vec<Value> = RUNS
         .iter()
-        .map(|(map, algorithm)| {
-            let weights = weights_sha256(map, algorithm);
-            json!({ "map": map, "algorithm": algorithm, "weights_sha256": weights })
+        .map(|run| {
+            let [preset, map, algorithm] = run;
+            let weights = weights_sha256(*run);
+            json!({ "preset": preset, "map": map, "algorithm": algorithm, "weights_sha256": weights })
         })
         .collect();
     let found = json!({
-        "of": "mackrl train --preset paper-code --map MAP --algorithm ALGORITHM --steps 3000 --seed 1: SHA-256 of weights.safetensors without its __metadata__",
+        "of": "mackrl train --preset PRESET --map MAP --algorithm ALGORITHM --steps 3000 --seed 1: SHA-256 of weights.safetensors without its __metadata__",
         "simulator": SIMULATOR_VERSION,
         "learning": LEARNING_VERSION,
         "runs": runs,

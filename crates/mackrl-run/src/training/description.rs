@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// Version of the description; it changes when a reader of the former would be misled.
-const FORMAT: &str = "mackrl/2";
+const FORMAT: &str = "mackrl/3";
 
 /// The texts of a team that has trained for `steps_env` steps and ends with exploration ε.
 pub(super) fn description(

@@ -52,7 +52,7 @@ impl Bank {
         let mut network = RecurrentNetwork::new(layout, level.name, sizes);
         let normalises = settings.networks != NetworkStyle::Plain;
         if normalises {
-            network = network.with_normalised_features();
+            network = network.with_normalisation();
         }
         Self {
             network,

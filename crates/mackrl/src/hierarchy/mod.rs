@@ -63,8 +63,8 @@ pub enum NetworkStyle {
     /// As the paper's: nothing is normalised, and initial parameters are uniform as PyTorch draws them.
     #[default]
     Plain,
-    /// As those that learn under a clipped surrogate: inputs and features are normalised row by row, initial weights are
-    /// orthogonal, and the first logits close to each other.
+    /// As those that learn under a clipped surrogate: inputs, features and what the last layer reads of recurrent states are
+    /// normalised row by row, initial weights are orthogonal, and the first logits close to each other.
     Normalised {
         /// What the orthogonal weights of the last layers are multiplied by.
         gain: f64,

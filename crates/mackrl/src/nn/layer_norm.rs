@@ -36,44 +36,50 @@ impl<E: Element> Kernel<E> for NormaliseRows<'_, E> {
     }
 }
 
-/// max(x, 0), then normalised, in place.
+/// Normalises rows in place and keeps what the way back needs; where it rectifies, max(x, 0) instead of x.
 ///
 /// # Equation
-/// `y = (max(x, 0) − μ) / √(σ² + 1e-5)`, with the mean μ and the variance σ² of the row's max(x, 0).
+/// `y = (x − μ) / √(σ² + 1e-5)`, with the mean μ and the variance σ² of the row.
 #[derive(Debug)]
-pub(crate) struct RectifyNormalise<'a, R> {
+pub(crate) struct Normalise<'a, R> {
     /// Length of a row.
     pub(crate) columns: usize,
+    /// Whether max(x, 0) is normalised, or x.
+    pub(crate) rectifies: bool,
     /// [rows, columns]
     pub(crate) values: &'a mut [R],
     /// [rows, 2], written.
     pub(crate) kept: &'a mut [R],
 }
 
-impl<E: Element> Kernel<E> for RectifyNormalise<'_, E> {
+impl<E: Element> Kernel<E> for Normalise<'_, E> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes<Element = E>>(self, lanes: L) {
         let rows = self.values.chunks_exact_mut(self.columns);
         for (row, kept) in rows.zip(self.kept.chunks_exact_mut(KEPT)) {
-            for part in row.chunks_mut(L::LANES) {
-                let value = lanes.load(part);
-                lanes.store(part, lanes.where_positive(value, value));
+            if self.rectifies {
+                for part in row.chunks_mut(L::LANES) {
+                    let value = lanes.load(part);
+                    lanes.store(part, lanes.where_positive(value, value));
+                }
             }
             kept.copy_from_slice(&normalise(lanes, row));
         }
     }
 }
 
-/// From the gradient of what [`RectifyNormalise`] gave to that of its argument, in place.
+/// From the gradient of what [`Normalise`] gave to that of its argument, in place.
 ///
 /// # Equation
-/// `∂x_j = (∂y_j − mean(∂y) − y_j mean(∂y · y)) / √(σ² + 1e-5)` where x was positive, else 0.
+/// `∂x_j = (∂y_j − mean(∂y) − y_j mean(∂y · y)) / √(σ² + 1e-5)`; 0 where it rectifies and x was not positive.
 #[derive(Debug)]
-pub(crate) struct RectifyNormaliseGradient<'a, R> {
+pub(crate) struct NormaliseGradient<'a, R> {
     /// Length of a row.
     pub(crate) columns: usize,
+    /// As in [`Normalise`].
+    pub(crate) rectifies: bool,
     /// [rows, columns]
     pub(crate) normalised: &'a [R],
     /// [rows, 2]
@@ -82,7 +88,7 @@ pub(crate) struct RectifyNormaliseGradient<'a, R> {
     pub(crate) gradient: &'a mut [R],
 }
 
-impl<E: Element> Kernel<E> for RectifyNormaliseGradient<'_, E> {
+impl<E: Element> Kernel<E> for NormaliseGradient<'_, E> {
     type Output = ();
 
     #[inline(always)]
@@ -99,7 +105,14 @@ impl<E: Element> Kernel<E> for RectifyNormaliseGradient<'_, E> {
                 let value = lanes.load(y);
                 let centred = lanes.sub(lanes.load(dy), mean);
                 let dx = lanes.mul(lanes.mul_add(value, along, centred), scale);
-                lanes.store(dy, lanes.where_positive(lanes.sub(value, zero), dx));
+                lanes.store(
+                    dy,
+                    if self.rectifies {
+                        lanes.where_positive(lanes.sub(value, zero), dx)
+                    } else {
+                        dx
+                    },
+                );
             }
         }
     }
@@ -160,8 +173,9 @@ mod tests {
         let coefficients = [0.5, -1.0, 2.0, 0.25, 0.7, -0.3, 1.1, -0.9, 0.4, 0.8];
         let run = |x: &[f64]| {
             let (mut y, mut kept) = (x.to_vec(), vec![0.0; 2 * KEPT]);
-            f64::dispatch(RectifyNormalise {
+            f64::dispatch(Normalise {
                 columns: 5,
+                rectifies: true,
                 values: &mut y,
                 kept: &mut kept,
             });
@@ -173,8 +187,9 @@ mod tests {
         };
         let (y, kept) = run(&x);
         let mut gradient = coefficients;
-        f64::dispatch(RectifyNormaliseGradient {
+        f64::dispatch(NormaliseGradient {
             columns: 5,
+            rectifies: true,
             normalised: &y,
             kept: &kept,
             gradient: &mut gradient,
@@ -198,14 +213,16 @@ mod tests {
             .collect();
         let run = || {
             let (mut values, mut kept) = (numbers.clone(), vec![0.0; 6 * KEPT]);
-            f32::dispatch(RectifyNormalise {
+            f32::dispatch(Normalise {
                 columns: 37,
+                rectifies: true,
                 values: &mut values,
                 kept: &mut kept,
             });
             let mut gradient = numbers.clone();
-            f32::dispatch(RectifyNormaliseGradient {
+            f32::dispatch(NormaliseGradient {
                 columns: 37,
+                rectifies: true,
                 normalised: &values,
                 kept: &kept,
                 gradient: &mut gradient,

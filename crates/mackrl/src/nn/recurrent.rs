@@ -10,7 +10,7 @@ use crate::{
         gates::GATES,
         gru::{Gru, GruWeights},
         lanes::{Element, Kernel, Lanes},
-        layer_norm::{KEPT, RectifyNormalise, RectifyNormaliseGradient},
+        layer_norm::{KEPT, Normalise, NormaliseGradient},
         linear::{Linear, LinearWeights},
         parameters::ParameterLayout,
         trace::{Step, Trace, Workspace},
@@ -40,7 +40,7 @@ pub struct RecurrentNetwork {
     input: Linear,
     gru: Gru,
     output: Linear,
-    /// Whether features are normalised.
+    /// Whether features and what the last layer reads are normalised.
     normalises: bool,
 }
 
@@ -68,9 +68,10 @@ impl RecurrentNetwork {
         }
     }
 
-    /// The same network with its features, the output of the first layer, normalised row by row after `ReLU`.
+    /// The same network with its features (the output of the first layer after `ReLU`) and what the last layer reads of the
+    /// recurrent states normalised row by row.
     #[must_use]
-    pub const fn with_normalised_features(mut self) -> Self {
+    pub const fn with_normalisation(mut self) -> Self {
         self.normalises = true;
         self
     }
@@ -159,8 +160,9 @@ impl RecurrentNetwork {
         let features = &mut trace.features.as_mut_slice()[first * hidden..][..rows * hidden];
         self.input.forward(&weights.input, rows, x, features);
         if self.normalises {
-            E::dispatch(RectifyNormalise {
+            E::dispatch(Normalise {
                 columns: hidden,
+                rectifies: true,
                 values: &mut *features,
                 kept: &mut trace.norms.as_mut_slice()[first * KEPT..][..rows * KEPT],
             });
@@ -183,11 +185,28 @@ impl RecurrentNetwork {
             return;
         }
         let logits = &mut trace.logits.as_mut_slice()[asked.start * outputs..];
-        let states = if trace.selective {
+        let states = if self.copies_states(trace.selective) {
+            trace.asked_hidden.grow(asked.end * hidden);
             let states = &mut trace.asked_hidden.as_mut_slice()[asked.start * hidden..];
-            let gathered = states.chunks_exact_mut(hidden);
-            for (state, &row) in gathered.zip(&trace.asked[asked.clone()]) {
-                state.copy_from_slice(&trace.hidden.as_slice()[row * hidden..][..hidden]);
+            let hidden_states = trace.hidden.as_slice();
+            if trace.selective {
+                let gathered = states.chunks_exact_mut(hidden);
+                for (state, &row) in gathered.zip(&trace.asked[asked.clone()]) {
+                    state.copy_from_slice(&hidden_states[row * hidden..][..hidden]);
+                }
+            } else {
+                let size = rows * hidden;
+                states[..size].copy_from_slice(&hidden_states[first * hidden..][..size]);
+            }
+            if self.normalises {
+                trace.state_norms.grow(asked.end * KEPT);
+                E::dispatch(Normalise {
+                    columns: hidden,
+                    rectifies: false,
+                    values: &mut states[..asked.len() * hidden],
+                    kept: &mut trace.state_norms.as_mut_slice()[asked.start * KEPT..]
+                        [..asked.len() * KEPT],
+                });
             }
             &*states
         } else {
@@ -294,8 +313,9 @@ impl RecurrentNetwork {
             .input_gradient(&weights.gru, rows, gates, features_gradient);
         let features = &trace.features.as_slice()[first * hidden..][..rows * hidden];
         if self.normalises {
-            E::dispatch(RectifyNormaliseGradient {
+            E::dispatch(NormaliseGradient {
                 columns: hidden,
+                rectifies: true,
                 normalised: features,
                 kept: &trace.norms.as_slice()[first * KEPT..][..rows * KEPT],
                 gradient: features_gradient,
@@ -329,7 +349,7 @@ impl RecurrentNetwork {
         } = &mut trace.workspace;
         let logits_gradient = &trace.logits_gradient.as_slice()[asked.start * outputs..];
         let count = asked.len();
-        if !trace.selective {
+        if !self.copies_states(trace.selective) {
             let gradient = hidden_gradient.as_mut_slice();
             self.output
                 .input_gradient(&weights.output, count, logits_gradient, gradient);
@@ -340,15 +360,36 @@ impl RecurrentNetwork {
         let gradients = asked_gradient.as_mut_slice();
         self.output
             .input_gradient(&weights.output, count, logits_gradient, gradients);
-        let places = trace.asked[asked.clone()]
-            .iter()
-            .map(|row| row - rows.start);
-        for (place, terms) in places.zip(gradients.chunks_exact(hidden)) {
+        if self.normalises {
+            E::dispatch(NormaliseGradient {
+                columns: hidden,
+                rectifies: false,
+                normalised: &trace.asked_hidden.as_slice()[asked.start * hidden..]
+                    [..count * hidden],
+                kept: &trace.state_norms.as_slice()[asked.start * KEPT..][..count * KEPT],
+                gradient: &mut gradients[..count * hidden],
+            });
+        }
+        let mut add = |place: usize, terms: &[E]| {
             let sums = &mut hidden_gradient.as_mut_slice()[place * hidden..][..hidden];
             for (sum, &term) in sums.iter_mut().zip(terms) {
                 *sum += term;
             }
+        };
+        let terms = gradients.chunks_exact(hidden).take(count).enumerate();
+        for (index, terms) in terms {
+            let place = if trace.selective {
+                trace.asked[asked.start + index] - rows.start
+            } else {
+                index
+            };
+            add(place, terms);
         }
+    }
+
+    /// Whether the last layer reads a copy of the recurrent states: of some rows, or normalised.
+    const fn copies_states(&self, selective: bool) -> bool {
+        selective || self.normalises
     }
 
     /// Adds the gradients of the last layer's parameters over some rows of logits.
@@ -364,7 +405,7 @@ impl RecurrentNetwork {
         let NetworkSizes {
             hidden, outputs, ..
         } = trace.sizes;
-        let states = if trace.selective {
+        let states = if self.copies_states(trace.selective) {
             &trace.asked_hidden
         } else {
             &trace.hidden

@@ -61,8 +61,10 @@ pub struct Trace<R> {
     pub(crate) hidden: Aligned<R>,
     /// For every row of logits of a selective trace, its row among those of all steps.
     pub(crate) asked: Vec<usize>,
-    /// [rows of logits, hidden], the hidden states of those rows of a selective trace.
+    /// [rows of logits, hidden], what the last layer read where it is not `hidden` itself: some rows of it, or normalised ones.
     pub(crate) asked_hidden: Aligned<R>,
+    /// [rows of logits, 2], what the latter keep for the backward pass.
+    pub(crate) state_norms: Aligned<R>,
     /// [rows of logits, outputs]
     pub(crate) logits: Aligned<R>,
     /// [rows of logits, outputs]
@@ -114,6 +116,7 @@ impl<R: Real> Trace<R> {
             hidden: Aligned::default(),
             asked: Vec::new(),
             asked_hidden: Aligned::default(),
+            state_norms: Aligned::default(),
             logits: Aligned::default(),
             logits_gradient: Aligned::default(),
             workspace: Workspace::default(),
@@ -204,7 +207,6 @@ impl<R: Real> Trace<R> {
         let (first, end) = (step.rows.start, step.asked.end);
         self.asked.extend(rows.iter().map(|row| first + row));
         self.logits.grow(end * self.sizes.outputs);
-        self.asked_hidden.grow(end * self.sizes.hidden);
     }
 
     /// Whether a backward pass has used the activations up; a new episode begins unspent.

@@ -10,7 +10,7 @@ use crate::{
     nn::{
         aligned::Aligned,
         lanes::Element,
-        layer_norm::{KEPT, RectifyNormalise, RectifyNormaliseGradient},
+        layer_norm::{KEPT, Normalise, NormaliseGradient},
         linear::{Linear, LinearWeights},
         parameters::ParameterLayout,
     },
@@ -155,15 +155,17 @@ impl ValueNetwork {
                 }
             }
         }
-        E::dispatch(RectifyNormalise {
+        E::dispatch(Normalise {
             columns: hidden,
+            rectifies: true,
             values: &mut *first,
             kept: &mut first_norms.as_mut_slice()[..rows * KEPT],
         });
         let second = &mut second.as_mut_slice()[..rows * hidden];
         self.inner.forward(&weights.inner, rows, first, second);
-        E::dispatch(RectifyNormalise {
+        E::dispatch(Normalise {
             columns: hidden,
+            rectifies: true,
             values: &mut *second,
             kept: &mut second_norms.as_mut_slice()[..rows * KEPT],
         });
@@ -207,8 +209,9 @@ impl ValueNetwork {
         d_second.fill(E::ZERO);
         self.output
             .input_gradient(&weights.output, rows, dv, d_second);
-        E::dispatch(RectifyNormaliseGradient {
+        E::dispatch(NormaliseGradient {
             columns: hidden,
+            rectifies: true,
             normalised: second,
             kept: &second_norms.as_slice()[..rows * KEPT],
             gradient: &mut *d_second,
@@ -219,8 +222,9 @@ impl ValueNetwork {
         d_first.fill(E::ZERO);
         self.inner
             .input_gradient(&weights.inner, rows, d_second, d_first);
-        E::dispatch(RectifyNormaliseGradient {
+        E::dispatch(NormaliseGradient {
             columns: hidden,
+            rectifies: true,
             normalised: first,
             kept: &first_norms.as_slice()[..rows * KEPT],
             gradient: &mut *d_first,

@@ -243,7 +243,8 @@ pub struct ControllerDescription {
     pub explores: bool,
     /// How long its controllers remember.
     pub memory: Memory,
-    /// Whether a row of inputs, and one of the first layer's outputs after `ReLU`, is normalised: `(x − μ) / √(σ² + 1e-5)`.
+    /// Whether a row of inputs, of the first layer's outputs after `ReLU`, and of what the last layer reads is normalised:
+    /// `(x − μ) / √(σ² + 1e-5)`.
     pub normalised: bool,
 }
 

@@ -13,8 +13,8 @@
 //! 3. values in units of returns, clipped (.2), with Huber's loss (10); not recurrent, where MAPPO's are;
 //! 4. entropy of the *marginal*: what a group does over all ways to it;
 //! 5. epochs over the whole batch, with activations computed anew through whole episodes: no chunks, no minibatches;
-//! 6. inputs and features normalised by row, without gain and bias of their own; orthogonal initial weights, the last layer's
-//!    times .01; one feature layer before the recurrent unit, and nothing normalised after it;
+//! 6. inputs, features and recurrent states normalised by row, without gain and bias of their own; orthogonal initial weights, the
+//!    last layer's times .01; one feature layer before the recurrent unit;
 //! 7. dead agents have no row and no weight in the policy's loss; to the critic they show their identity alone;
 //! 8. Adam with ε = 1e-5, gradients of norm at most 10, step sizes that may fall.
 
