@@ -46,8 +46,9 @@ struct Run {
 impl Run {
     fn new(world: &RunWorld, kind: &dyn AlgorithmKind, settings: &str, threads: usize) -> Self {
         let mut table = kind.defaults();
-        let own: toml::Table = toml::from_str(&format!("{SMALL}{settings}")).expect("TOML");
-        table.extend(own);
+        for own in [SMALL, settings] {
+            table.extend(toml::from_str::<toml::Table>(own).expect("TOML"));
+        }
         kind.check(&table, world.spec())
             .expect("settings within their ranges");
         let prior = world.prior();
@@ -273,11 +274,30 @@ fn mackrl_ppo_that_always_delegates_is_mappo_to_the_bit() {
     }
 }
 
+/// A second minibatch is weighed against what acted, not against what the first one made of it.
+#[test]
+fn ratios_are_those_to_what_acted() {
+    let world = world(&["env.map=3m"]);
+    for partitions in ["round-robin", "all"] {
+        let divergence = |minibatches: usize| {
+            let settings =
+                format!("partitions = \"{partitions}\"\nepochs = 1\nminibatches = {minibatches}");
+            let tally = Run::new(&world, &MackrlPpo, &settings, 1).update();
+            let mut means = tally.means();
+            let divergence = means.find(|(name, _)| *name == "divergence");
+            divergence.expect("a metric of the learner").1
+        };
+        assert_eq!(divergence(1), 0.0, "{partitions}");
+        assert!(divergence(2) > 0.0, "{partitions}");
+    }
+}
+
 #[test]
 fn a_run_has_the_same_bits_on_any_number_of_threads_and_after_a_restoration() {
     let world = world(&["env.map=3m"]);
-    let kinds: [(&dyn AlgorithmKind, &str); 5] = [
+    let kinds: [(&dyn AlgorithmKind, &str); 6] = [
         (&MackrlPpo, "shards = 3"),
+        (&MackrlPpo, "shards = 4\nminibatches = 3"),
         (&MackrlPpo, "partitions = \"all\""),
         (&MackrlPpo, "hold_steps_env = 0\ngroups = \"formed\""),
         (

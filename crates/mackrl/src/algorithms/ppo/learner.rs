@@ -1,8 +1,10 @@
 //! The learner of MACKRL-PPO, MAPPO and IPPO.
 //!
-//! An update takes a batch of whole episodes. Values, advantages and groups are found once; then every epoch computes the
-//! networks anew and takes one step of the policy and one of the critic on the whole batch. All of it is cut into the pieces of
-//! the batch, whose sums are taken in their order: the number of threads changes nothing.
+//! An update takes a batch of whole episodes. Values, advantages, groups and what acted are found once; then every epoch goes
+//! through the batch, all at once or in minibatches of some of its pieces, and for each computes the networks anew and takes one
+//! step of the policy and one of the critic. Sums over pieces are taken in their order: the number of threads changes nothing.
+
+use std::ops::Range;
 
 use mackrl_env::{EpisodeKey, Stream};
 
@@ -101,10 +103,10 @@ impl Ppo {
         self.critic.parameters()
     }
 
-    /// Finds values, advantages and groups, and gives the sums over the batch.
+    /// Finds values, advantages, groups and the probabilities under which they acted, and gives the sums over the batch.
     fn prepare(&mut self, batch: &mut [&mut Piece]) -> Result<Sums, Error> {
         self.memories.resize_with(batch.len(), Memory::default);
-        let (hierarchy, critic) = (&self.hierarchy, &self.critic);
+        let (hierarchy, critic, parameters) = (&self.hierarchy, &self.critic, &self.parameters);
         let (settings, critic_settings) = (&self.settings, self.critic_settings);
         let weighing = hierarchy.factorises().then_some(self.weighing);
         let mut work = works(batch, &mut self.memories);
@@ -115,7 +117,12 @@ impl Ppo {
             if let Some(weighing) = weighing {
                 work.memory.factors = hierarchy.factors(experience, weighing);
             }
+            let acted = work.memory.recall(hierarchy, parameters, work.piece);
+            work.outcome = acted.map(|()| Epoch::default());
         });
+        for work in work {
+            work.outcome?;
+        }
         let mut sums = Sums::default();
         let scale = self.critic.scale().mean_and_deviation();
         for (shard, memory) in self.memories.iter().enumerate() {
@@ -143,13 +150,15 @@ impl Ppo {
         }
     }
 
-    /// One step of the policy and one of the critic. Gives what the epoch came to, and the norms of both gradients.
-    fn epoch(
+    /// One step of the policy and one of the critic on some pieces of the batch. Gives what they came to, and the norms of both
+    /// gradients.
+    fn step(
         &mut self,
         batch: &mut [&mut Piece],
-        weights: [f32; 2],
-        is_first: bool,
+        pieces: Range<usize>,
     ) -> Result<(Epoch, [f64; 2]), Error> {
+        let memories = &mut self.memories[pieces.clone()];
+        let weights = minibatch_weights(memories);
         let factorises = self.hierarchy.factorises();
         let groups = if factorises {
             1
@@ -164,9 +173,8 @@ impl Ppo {
             clip: Real::from_f64(self.settings.clip / (groups as f64).sqrt()),
             entropy_weight: Real::from_f64(self.settings.entropy_weight_at(self.steps_env)),
             weights,
-            is_first,
         };
-        let mut work = works(batch, &mut self.memories);
+        let mut work = works(&mut batch[pieces], memories);
         for_each_in_parallel(self.threads, &mut work, |work| {
             work.outcome = work.memory.differentiate(rule, work.piece);
         });
@@ -174,7 +182,7 @@ impl Ppo {
         for work in work {
             total.add(work.outcome?);
         }
-        let Some((first, others)) = self.memories.split_first_mut() else {
+        let Some((first, others)) = memories.split_first_mut() else {
             return Err(Error::Data("there is no step to learn from".to_owned()));
         };
         for other in others {
@@ -232,25 +240,31 @@ impl Algorithm for Ppo {
         self.critic.note_returns(sums.returns);
         self.finish_preparation(batch, &sums);
         stopwatch.lap(Phase::Critic);
-        let weights = [sums.advantages[0], sums.returns[0]];
-        let weights = weights.map(|count| Real::from_f64(1.0 / count));
         let mut tally = Tally::default();
-        let choices = (self.memories.iter().map(|memory| memory.advantage_i.len())).sum::<usize>();
+        let size = batch.len().div_ceil(self.settings.minibatches);
         for epoch in 0..self.settings.epochs {
-            let (own, norms) = self.epoch(batch, weights, epoch == 0)?;
-            stopwatch.lap(Phase::Backward);
-            for (name, value) in [
-                ("pg_loss", own.surrogate.loss),
-                ("agent_grad_norm", norms[0]),
-                ("critic_loss", own.critic_loss),
-                ("critic_grad_norm", norms[1]),
-                ("group_entropy", own.entropy / choices as f64),
-            ] {
-                tally.add(name, value, 1.0);
-            }
-            if epoch + 1 == self.settings.epochs {
-                tally.add("clipped_share", own.surrogate.clipped, choices as f64);
-                tally.add("divergence", own.surrogate.divergence, choices as f64);
+            for start in (0..batch.len()).step_by(size) {
+                let pieces = start..batch.len().min(start + size);
+                let choices = self.memories[pieces.clone()].iter();
+                let choices: usize = choices.map(|memory| memory.advantage_i.len()).sum();
+                if choices == 0 {
+                    continue;
+                }
+                let (own, norms) = self.step(batch, pieces)?;
+                stopwatch.lap(Phase::Backward);
+                for (name, value) in [
+                    ("pg_loss", own.surrogate.loss),
+                    ("agent_grad_norm", norms[0]),
+                    ("critic_loss", own.critic_loss),
+                    ("critic_grad_norm", norms[1]),
+                    ("group_entropy", own.entropy / choices as f64),
+                ] {
+                    tally.add(name, value, 1.0);
+                }
+                if epoch + 1 == self.settings.epochs {
+                    tally.add("clipped_share", own.surrogate.clipped, choices as f64);
+                    tally.add("divergence", own.surrogate.divergence, choices as f64);
+                }
             }
         }
         for memory in &self.memories {
@@ -344,6 +358,14 @@ fn critic_settings(settings: &PpoSettings, sight: Sight, team: Team<'_>) -> Team
         optimiser: PpoSettings::OPTIMISER,
         loss: settings.value_loss(),
     }
+}
+
+/// What each choice and each value of a minibatch counts for: 1 / the number of choices of living agents, and of values.
+fn minibatch_weights(memories: &[Memory]) -> [f32; 2] {
+    let alive = memories.iter().flat_map(|memory| &memory.alive_sn);
+    let choices = alive.filter(|alive| **alive).count();
+    let values: usize = memories.iter().map(|memory| memory.value_sn.len()).sum();
+    [choices, values].map(|count| Real::from_f64(1.0 / count as f64))
 }
 
 fn add_to(sums: &mut [f32], terms: &[f32]) {

@@ -66,7 +66,6 @@ pub(super) struct Rule<'a> {
     pub(super) entropy_weight: f32,
     /// What each choice counts for, and each value.
     pub(super) weights: [f32; 2],
-    pub(super) is_first: bool,
 }
 
 /// Numbers over a whole batch.
@@ -183,6 +182,27 @@ impl Memory {
         }
     }
 
+    /// Recalls the log q under which the piece was played, and whether the controllers read their input.
+    pub(super) fn recall(
+        &mut self,
+        hierarchy: &Hierarchy,
+        parameters: &Parameters,
+        piece: &mut Piece,
+    ) -> Result<(), Error> {
+        let activations = if hierarchy.factorises() {
+            let (_, activations) = hierarchy.networks(parameters, piece)?;
+            hierarchy.log_q(activations, &self.factors, &mut self.old_log_q_i);
+            activations
+        } else {
+            let (_, activations) = hierarchy.evaluate(parameters, piece)?;
+            flatten(activations.log_p_bt(), &mut self.old_log_q_i);
+            activations
+        };
+        self.health = Tally::default();
+        hierarchy.report_health(activations, &mut self.health);
+        Ok(())
+    }
+
     /// Writes the gradients of policy and critic for this piece.
     pub(super) fn differentiate(
         &mut self,
@@ -225,7 +245,6 @@ impl Memory {
             ..
         } = rule;
         let (experience, activations) = hierarchy.networks(parameters, piece)?;
-        self.note_health(rule, activations);
         hierarchy.log_q(activations, &self.factors, &mut self.log_q_i);
         let surrogate = self.surrogate(rule);
         let entropy = hierarchy.backward_factors(
@@ -256,10 +275,7 @@ impl Memory {
         } = rule;
         let (experience, activations): (&Experience, &mut Activations) =
             hierarchy.evaluate(parameters, piece)?;
-        self.note_health(rule, activations);
-        self.log_q_i.clear();
-        self.log_q_i
-            .extend(activations.log_p_bt().iter().flatten().copied());
+        flatten(activations.log_p_bt(), &mut self.log_q_i);
         let surrogate = self.surrogate(rule);
         let bonus = rule.weights[0] * rule.entropy_weight;
         let mut entropy = 0.0;
@@ -286,19 +302,8 @@ impl Memory {
         Ok((surrogate, entropy))
     }
 
-    /// Notes whether the controllers that acted read their input.
-    fn note_health(&mut self, rule: Rule<'_>, activations: &Activations) {
-        if rule.is_first {
-            self.health = Tally::default();
-            rule.hierarchy.report_health(activations, &mut self.health);
-        }
-    }
-
-    /// The surrogate under the present log q; in the first epoch, those are what acted.
+    /// The surrogate under the present log q.
     fn surrogate(&mut self, rule: Rule<'_>) -> Surrogate {
-        if rule.is_first {
-            self.old_log_q_i.clone_from(&self.log_q_i);
-        }
         clipped_surrogate(
             rule.clip,
             rule.weights[0],
@@ -306,6 +311,11 @@ impl Memory {
             &mut self.d_log_q_i,
         )
     }
+}
+
+fn flatten(log_p_bt: &[Vec<f32>], log_p: &mut Vec<f32>) {
+    log_p.clear();
+    log_p.extend(log_p_bt.iter().flatten().copied());
 }
 
 impl Epoch {

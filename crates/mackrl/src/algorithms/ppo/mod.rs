@@ -12,7 +12,8 @@
 //!    counts as an end;
 //! 3. values in units of returns, clipped (.2), with Huber's loss (10); not recurrent, where MAPPO's are;
 //! 4. entropy of the *marginal*: what a group does over all ways to it;
-//! 5. epochs over the whole batch, with activations computed anew through whole episodes: no chunks, no minibatches;
+//! 5. epochs over minibatches of whole episodes (one, unless set), with activations computed anew from the first step to the last:
+//!    no chunks, so that no stale state is read;
 //! 6. inputs, features and recurrent states normalised by row, without gain and bias of their own; orthogonal initial weights, the
 //!    last layer's times .01; one feature layer before the recurrent unit;
 //! 7. dead agents have no row and no weight in the policy's loss; to the critic they show their identity alone;
@@ -138,8 +139,9 @@ impl AlgorithmKind for MackrlPpo {
         table: &toml::Table,
         spec: &EnvironmentSpec,
     ) -> Result<toml::Table, SettingsError> {
-        let (settings, _) = Self::read(table)?;
+        let (settings, learning) = Self::read(table)?;
         settings.check(spec.agents, &spec.name)?;
+        learning.check()?;
         Ok(table.clone())
     }
 
@@ -184,7 +186,7 @@ impl<V: Values> AlgorithmKind for AgentsAlone<V> {
         table: &toml::Table,
         _spec: &EnvironmentSpec,
     ) -> Result<toml::Table, SettingsError> {
-        PpoSettings::read(table)?;
+        PpoSettings::read(table)?.check()?;
         Ok(table.clone())
     }
 

@@ -50,9 +50,11 @@ declare_settings! {
         schedule_steps_env: u64 = 200_000, Accepts::integer(1, EXACT);
         /// What both step sizes are multiplied by in the end.
         learning_rate_finish: f64 = 0.3, Accepts::above_within(0.0, 1.0);
-        /// Times that a batch is gone through. Each epoch is one step of the controllers and one of the critic on the whole batch;
-        /// activations are computed anew, from the first step of each episode to the last.
+        /// Times that a batch is gone through. Activations are computed anew each time, from the first step of each episode to the last.
         epochs: usize = 10, Accepts::integer(1, 1000);
+        /// Parts into which an epoch cuts a batch, for each of which controllers and critic take one step. A part is one shard or
+        /// more, so that there are no more parts than shards.
+        minibatches: usize = 1, Accepts::integer(1, 4096);
         /// How far a group's ratio of probabilities may move from 1 before it gains nothing more. Where a ratio is that of the whole
         /// team, this is divided by the square root of the number of groups.
         clip: f64 = 0.2, Accepts::above_within(0.0, 1.0);
@@ -130,6 +132,25 @@ impl PpoSettings {
         (steps_env as f64 / self.schedule_steps_env as f64).min(1.0)
     }
 
+    /// Checks what a setting asks of others.
+    pub(super) fn check(&self) -> Result<(), SettingsError> {
+        if self.minibatches <= self.shards {
+            return Ok(());
+        }
+        Err(SettingsError::AtOdds(Box::new([
+            wrong(
+                "minibatches",
+                self.minibatches.to_string(),
+                "as many as shards, or fewer",
+            ),
+            wrong(
+                "shards",
+                self.shards.to_string(),
+                "as many as minibatches, or more",
+            ),
+        ])))
+    }
+
     /// What makes a value wrong.
     pub(super) fn value_loss(&self) -> ValueLoss<f32> {
         use crate::Real;
@@ -154,12 +175,6 @@ impl MackrlPpoSettings {
         if self.partitions == PartitionChoice::RoundRobin || self.hold_steps_env == 1 {
             return Ok(());
         }
-        let wrong = |name: &str, found: String, expected: &str| WrongSetting {
-            name: name.to_owned(),
-            found,
-            expected: expected.to_owned(),
-            nearest: None,
-        };
         Err(SettingsError::AtOdds(Box::new([
             wrong(
                 "hold_steps_env",
@@ -183,6 +198,15 @@ impl MackrlPpoSettings {
     }
 }
 
+fn wrong(name: &str, found: String, expected: &str) -> WrongSetting {
+    WrongSetting {
+        name: name.to_owned(),
+        found,
+        expected: expected.to_owned(),
+        nearest: None,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -201,6 +225,18 @@ mod tests {
             assert!((found - expected).abs() < 1e-12, "{steps}: {found}");
         }
         assert!((settings.entropy_weight_at(500) - 0.02).abs() < 1e-12);
+    }
+
+    #[test]
+    fn there_are_no_more_minibatches_than_shards() {
+        let cut = |minibatches, shards| PpoSettings {
+            minibatches,
+            shards,
+            ..PpoSettings::default()
+        };
+        assert!(cut(3, 4).check().is_ok());
+        assert!(cut(4, 4).check().is_ok());
+        assert!(cut(5, 4).check().is_err());
     }
 
     #[test]
