@@ -101,14 +101,12 @@ fn round_robin(map: &str, hold: usize, memory: Memory) -> Team {
     );
     let declaration = declaration
         .expect("a small team")
-        .with_partitions_held(hold, memory);
+        .with_partitions_held(hold, memory)
+        .with_delegation_logit(1.0);
     let settings = HierarchySettings {
         common_knowledge: CommonKnowledgeFeatures::Complete,
         hidden: 5,
-        networks: NetworkStyle::Normalised {
-            gain: 1.0,
-            delegation_logit: 1.0,
-        },
+        networks: NetworkStyle::Normalised { gain: 1.0 },
     };
     Team::declared(world, declaration, settings)
 }
@@ -336,11 +334,14 @@ fn every_metric_that_is_reported_is_explained() {
         let mut run = Run::new(&world, kind, settings, 1);
         let mut tally = run.update();
         tally.merge(&run.collector.tally());
-        let metrics = run.algorithm.metrics();
+        let of_policy = run.algorithm.policy().metrics();
+        let of_learner = run.algorithm.metrics().iter().map(|(name, _)| *name);
+        let names = of_policy.iter().map(|(name, _)| name.as_str());
+        let metrics: Vec<&str> = of_learner.chain(names).collect();
         for name in tally.names() {
-            let known = metrics.iter().any(|(known, _)| {
-                name == *known || known.ends_with('_') && name.starts_with(known)
-            });
+            let known = metrics
+                .iter()
+                .any(|known| name == *known || known.ends_with('_') && name.starts_with(known));
             assert!(known, "{name}");
         }
         assert!(tally.means().all(|(_, mean)| mean.is_finite()));

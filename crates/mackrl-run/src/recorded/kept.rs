@@ -20,6 +20,11 @@ const WON: &str = "test_battle_won_mean";
 const PLAYED: &str = "return_mean";
 /// Delegation by the number of commonly known enemies, which follows.
 const DELEGATION: &str = "mackrl/delegation_rate_ck_enemies_";
+/// How often that many enemies were commonly known.
+const CASES: &str = "mackrl/delegation_cases_ck_enemies_";
+
+/// Shares by the number of commonly known enemies, at each test; `None` where that did not occur.
+pub type ByEnemies = Vec<Vec<Option<f64>>>;
 
 /// What a run gave.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -32,7 +37,17 @@ pub struct TrainingRun {
     pub battle_won: Vec<f64>,
     /// During the first batch, and then during each interval, the share of chosen pairs that delegated, by the number of
     /// enemies they commonly knew; `None` where that did not occur.
-    pub delegation: Vec<Vec<Option<f64>>>,
+    pub delegation: ByEnemies,
+    /// At the same times, the share of chosen pairs with common knowledge that knew so many enemies. Nothing, in runs of early
+    /// versions.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub cases: ByEnemies,
+    /// As `delegation`, in the greedy test itself.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub test_delegation: ByEnemies,
+    /// As `cases`, in the greedy test itself.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub test_cases: ByEnemies,
 }
 
 /// A run as a file holds it; files of early versions do not say where they come from.
@@ -41,18 +56,27 @@ struct Stored {
     provenance: Option<Provenance>,
     config: String,
     battle_won: Vec<f64>,
-    delegation: Vec<Vec<Option<f64>>>,
+    delegation: ByEnemies,
+    #[serde(default)]
+    cases: ByEnemies,
+    #[serde(default)]
+    test_delegation: ByEnemies,
+    #[serde(default)]
+    test_cases: ByEnemies,
 }
 
 impl TrainingRun {
     /// A finished run with this configuration that this program made.
     #[must_use]
-    pub fn new(config: &Config, battle_won: Vec<f64>, delegation: Vec<Vec<Option<f64>>>) -> Self {
+    pub fn new(config: &Config, battle_won: Vec<f64>, delegation: ByEnemies) -> Self {
         Self {
             provenance: Provenance::of_run(config),
             config: config.to_toml(),
             battle_won,
             delegation,
+            cases: Vec::new(),
+            test_delegation: Vec::new(),
+            test_cases: Vec::new(),
         }
     }
 
@@ -79,9 +103,16 @@ impl TrainingRun {
         let stored: Stored =
             serde_json::from_slice(&bytes).map_err(|error| bad(error.to_string()))?;
         let config = config(&stored.config).map_err(|error| bad(error.to_string()))?;
-        let rates = stored.delegation.iter().flatten().flatten();
-        let mut shares = stored.battle_won.iter().chain(rates);
-        if let Some(share) = shares.find(|share| !(0.0..=1.0).contains(*share)) {
+        let tables = [
+            &stored.delegation,
+            &stored.cases,
+            &stored.test_delegation,
+            &stored.test_cases,
+        ];
+        let rates = tables.into_iter().flatten().flatten().flatten();
+        let wrong = |share: &&f64| !(0.0..=1.0).contains(*share);
+        let wrong = stored.battle_won.iter().chain(rates).find(wrong).copied();
+        if let Some(share) = wrong {
             return Err(bad(format!("a share is {share}, expected 0 to 1")));
         }
         Ok(Self {
@@ -89,6 +120,9 @@ impl TrainingRun {
             config: stored.config,
             battle_won: stored.battle_won,
             delegation: stored.delegation,
+            cases: stored.cases,
+            test_delegation: stored.test_delegation,
+            test_cases: stored.test_cases,
         })
     }
 
@@ -130,27 +164,37 @@ impl TrainingRun {
         let run = RecordedRun::open(folder.to_owned())?;
         let won = Measurements::read(&run, WON)?;
         let first_batch = Measurements::read(&run, PLAYED)?.steps.first().copied();
-        let mut delegation = vec![Vec::new(); won.values.len()];
         let world = run.config.env.world()?;
         let enemies = world.spec().entities - world.spec().agents;
-        for enemies in 0..=enemies {
-            let metric = format!("{DELEGATION}{enemies}");
-            let rates = match Measurements::read(&run, &metric) {
-                Ok(rates) => rates,
-                Err(error) if error.is_missing_metric() => continue,
-                Err(error) => return Err(error),
-            };
-            for (&step, &rate) in rates.steps.iter().zip(&rates.values) {
-                // Beside the row of the first batch, those of tests count; a test after the last batch may stand at the step of
-                // another row.
-                let test = won.steps.iter().rposition(|&test| test == step);
-                let Some(test) = test.or_else(|| (first_batch == Some(step)).then_some(0)) else {
-                    continue;
+        let by_enemies = |metric: &str| -> Result<ByEnemies> {
+            let mut shares = vec![Vec::new(); won.values.len()];
+            for enemies in 0..=enemies {
+                let of = match Measurements::read(&run, &format!("{metric}{enemies}")) {
+                    Ok(of) => of,
+                    Err(error) if error.is_missing_metric() => continue,
+                    Err(error) => return Err(error),
                 };
-                delegation[test].resize(enemies, None);
-                delegation[test].push(Some(rate));
+                for (&step, &share) in of.steps.iter().zip(&of.values) {
+                    // Beside the row of the first batch, those of tests count; a test after the last batch may stand at the step
+                    // of another row.
+                    let test = won.steps.iter().rposition(|&test| test == step);
+                    let test = test.or_else(|| (first_batch == Some(step)).then_some(0));
+                    if let Some(test) = test {
+                        shares[test].resize(enemies, None);
+                        shares[test].push(Some(share));
+                    }
+                }
             }
-        }
+            Ok(shares)
+        };
+        let some = |shares: ByEnemies| match shares.iter().all(Vec::is_empty) {
+            true => Vec::new(),
+            false => shares,
+        };
+        let delegation = by_enemies(DELEGATION)?;
+        let cases = some(by_enemies(CASES)?);
+        let [test_delegation, test_cases] =
+            [DELEGATION, CASES].map(|metric| by_enemies(&format!("test_{metric}")).map(some));
         Ok(Self {
             config: run.config.to_toml(),
             provenance: run
@@ -160,6 +204,9 @@ impl TrainingRun {
                 .unwrap_or_else(|| Provenance::of_unknown_code(&run.config)),
             battle_won: won.values,
             delegation,
+            cases,
+            test_delegation: test_delegation?,
+            test_cases: test_cases?,
         })
     }
 }

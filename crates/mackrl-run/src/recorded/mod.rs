@@ -23,7 +23,7 @@ use crate::{
 pub use curve::{Axis, Measurements, final_mean, share_of};
 pub use find::{find, locate, open};
 pub use grid::Gridded;
-pub use kept::TrainingRun;
+pub use kept::{ByEnemies, TrainingRun};
 pub use series::{Grouping, Selection, Series, group};
 
 /// Folder of the files that are kept of the runs of a figure, below the figure's.

@@ -1,7 +1,7 @@
 //! Greedy episodes with fixed weights.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     sync::{Arc, atomic::AtomicBool},
 };
 
@@ -10,7 +10,7 @@ use mackrl::{
     experience::{Collector, Episode, PlaySettings},
     policy::{Behaviour, Parameters, Policy, Recording, Tally},
 };
-use mackrl_env::{EnvironmentSpec, EpisodeKey, Stream};
+use mackrl_env::{Action, EnvironmentSpec, EpisodeKey, Stream};
 use serde::{Serialize, Serializer, ser::SerializeMap};
 
 use super::assembly;
@@ -18,6 +18,8 @@ use crate::config::Config;
 
 /// Episodes that are played at once.
 const PARALLEL_EPISODES: usize = 32;
+/// Steps of an opening.
+const OPENING: usize = 10;
 /// Environments of a shard.
 const SHARD_SIZE: usize = 8;
 
@@ -33,6 +35,9 @@ pub struct Evaluation {
     pub quantities: Vec<Quantity>,
     /// What the controllers did, under the names that `METRICS` explains.
     pub controllers: BTreeMap<String, f64>,
+    /// The number of different openings (the joint actions of the first 10 steps) over that of episodes: a team that plays one
+    /// script whatever it sees has few.
+    pub distinct_openings: f64,
 }
 
 /// Something measured in every episode.
@@ -172,6 +177,7 @@ impl Evaluator {
         self.samples.clear();
         let mut tally = Tally::default();
         let mut keys = Vec::with_capacity(self.collector.environments());
+        let mut openings = BTreeSet::new();
         let mut next = 0;
         while next < episodes as u64 {
             let end = (next + self.collector.environments() as u64).min(episodes as u64);
@@ -183,6 +189,7 @@ impl Evaluator {
             let pieces = self.collector.pieces();
             for episode in pieces.flat_map(|piece| &piece.experience.episodes) {
                 self.samples.add(episode);
+                openings.insert(opening(episode));
             }
         }
         Ok(Evaluation {
@@ -192,8 +199,15 @@ impl Evaluator {
                 .means()
                 .map(|(name, mean)| (name.to_owned(), mean))
                 .collect(),
+            distinct_openings: openings.len() as f64 / episodes.max(1) as f64,
         })
     }
+}
+
+/// What a team did at first.
+fn opening(episode: &Episode) -> Vec<Action> {
+    let steps = 0..episode.steps().min(OPENING);
+    steps.flat_map(|t| episode.actions(t)).copied().collect()
 }
 
 /// What is measured of an episode.

@@ -3,8 +3,12 @@
 //! Names without a prefix are PyMARL's, so that people's scripts find them. `mackrl/` is our own, `sys/` depends on the machine
 //! and the clock and is left out when runs are compared.
 
+use mackrl::{Error, algorithms::Algorithm};
 use mackrl_env::{EnvironmentSpec, Statistic};
 use serde::{Serialize, Serializer, ser::SerializeMap};
+
+use super::assembly;
+use crate::config::Config;
 
 /// A metric's name (or the part before a number) and what it means, of everything that depends neither on the algorithm,
 /// which explains its own, nor on the world: [`of_statistics`] and [`mackrl_env::Counter`] say what those mean.
@@ -36,6 +40,10 @@ pub const METRICS: &[(&str, &str)] = &[
     (
         "test_ep_length_mean",
         "mean length of greedy test episodes, in environment steps",
+    ),
+    (
+        "test_distinct_openings",
+        "share of different openings among the test's episodes, an opening being the joint actions of the first 10 steps: near 0, the team plays one script whatever it sees; 1, no two episodes begin alike",
     ),
     (
         "sys/episodes_discarded",
@@ -149,17 +157,44 @@ impl Serialize for MetricRow {
     }
 }
 
-/// Whether a metric is one that every run has, one of the algorithm's own (which may begin with `test_` for greedy episodes), or
-/// the mean of a statistic of the world over training episodes.
-#[must_use]
-pub fn is_explained(name: &str, of_algorithm: &[(&str, &str)], statistics: &[Statistic]) -> bool {
-    let own = name.strip_prefix("test_").unwrap_or(name);
-    let of_world = |statistic: &Statistic| name.strip_suffix("_mean") == Some(&*statistic.name);
-    explains(METRICS, name) || explains(of_algorithm, own) || statistics.iter().any(of_world)
+/// Names (or the parts before a number) and meanings of all that a run of `config` reports, the counters of its world aside, in the
+/// order: of every run, of its world, of its algorithm, of its controllers.
+///
+/// # Errors
+/// [`Error::Config`] if the configuration describes nothing that can be trained.
+pub fn explained(config: &Config) -> Result<Vec<(String, String)>, Error> {
+    let world = assembly::RunWorld::new(config)?;
+    let algorithm = assembly::algorithm(config, &world, 1)?;
+    let owned = |metrics: &[(&str, &str)]| -> Vec<(String, String)> {
+        let metrics = metrics.iter();
+        metrics
+            .map(|(name, meaning)| ((*name).to_owned(), (*meaning).to_owned()))
+            .collect()
+    };
+    Ok([
+        owned(METRICS),
+        of_statistics(world.spec()),
+        owned(algorithm.metrics()),
+        algorithm.policy().metrics(),
+    ]
+    .concat())
 }
 
-fn explains(metrics: &[(&str, &str)], name: &str) -> bool {
+/// Whether a metric is one that every run has, one of the algorithm's or its policy's own (which may begin with `test_` for greedy
+/// episodes), or the mean of a statistic of the world over training episodes.
+#[must_use]
+pub fn is_explained(name: &str, algorithm: &dyn Algorithm, statistics: &[Statistic]) -> bool {
+    let own = name.strip_prefix("test_").unwrap_or(name);
+    let of_world = |statistic: &Statistic| name.strip_suffix("_mean") == Some(&*statistic.name);
+    explains(METRICS, name)
+        || explains(algorithm.metrics(), own)
+        || explains(&algorithm.policy().metrics(), own)
+        || statistics.iter().any(of_world)
+}
+
+fn explains<S: AsRef<str>>(metrics: &[(S, S)], name: &str) -> bool {
     metrics.iter().any(|(explained, _)| {
+        let explained = explained.as_ref();
         name.strip_prefix(explained).is_some_and(|rest| {
             rest.is_empty() || explained.ends_with('_') && rest.bytes().all(|b| b.is_ascii_digit())
         })
@@ -184,17 +219,35 @@ mod tests {
 
     #[test]
     fn only_explained_names_and_numbered_ones_are_known() {
-        let own = [("rate_by_enemies_", ""), ("loss", "")];
+        let config = Config::default();
+        let world = assembly::RunWorld::new(&config).unwrap();
+        let own = assembly::algorithm(&config, &world, 1).unwrap();
         for name in [
-            "rate_by_enemies_12",
-            "test_rate_by_enemies_0",
-            "loss",
+            "mackrl/delegation_rate_ck_enemies_12",
+            "test_mackrl/delegation_rate_ck_enemies_0",
+            "saturation_pair_controller",
+            "pg_loss",
             "t_env",
         ] {
-            assert!(is_explained(name, &own, &[]), "{name}");
+            assert!(is_explained(name, &*own, &[]), "{name}");
         }
-        for name in ["rate_by_enemies_x", "t_envy", "losses"] {
-            assert!(!is_explained(name, &own, &[]), "{name}");
+        for name in [
+            "mackrl/delegation_rate_ck_enemies_x",
+            "saturation_four_controller",
+            "t_envy",
+            "pg_losses",
+        ] {
+            assert!(!is_explained(name, &*own, &[]), "{name}");
+        }
+        let explained = explained(&config).unwrap();
+        assert!(explained.iter().all(|(_, meaning)| !meaning.is_empty()));
+        for name in [
+            "t_env",
+            "test_battle_won_mean",
+            "pg_loss",
+            "logit_spread_pair_controller",
+        ] {
+            assert!(explained.iter().any(|(own, _)| own == name), "{name}");
         }
     }
 

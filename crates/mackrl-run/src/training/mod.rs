@@ -17,6 +17,6 @@ mod weights;
 pub use checkpoint::Checkpoint;
 pub use comparison::{Difference, compare_tensors};
 pub use evaluation::{Episodes, Evaluation, Quantity, evaluate, evaluate_in};
-pub use metrics::{METRICS, MetricRow, headline, is_explained, of_statistics};
+pub use metrics::{METRICS, MetricRow, explained, headline, is_explained, of_statistics};
 pub use trainer::Trainer;
 pub use weights::{StoredWeights, read_weights, write_weights};

@@ -239,9 +239,9 @@ impl Trainer {
     /// # Errors
     /// [`Error::Data`] if the checkpoint is damaged or belongs to another configuration. Nothing has changed then.
     pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), Error> {
-        let metrics = self.algorithm.metrics();
         let statistics = &self.world.spec().statistics;
-        let opened = checkpoint.open(|name| is_explained(name, metrics, statistics))?;
+        let own = &*self.algorithm;
+        let opened = checkpoint.open(|name| is_explained(name, own, statistics))?;
         self.algorithm.restore(&opened)?;
         let counters = opened.trainer;
         self.steps_env = counters.steps_env;
@@ -413,6 +413,7 @@ fn append_test(row: &mut MetricRow, evaluation: &Evaluation) {
     for quantity in &evaluation.quantities {
         row.push(format!("test_{}_mean", quantity.name), quantity.mean);
     }
+    row.push("test_distinct_openings", evaluation.distinct_openings);
     let delegation = evaluation.controllers.iter();
     for (name, value) in delegation.filter(|(name, _)| name.contains("delegation")) {
         row.push(format!("test_{name}"), *value);

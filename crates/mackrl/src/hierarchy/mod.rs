@@ -23,6 +23,7 @@ mod evaluation;
 mod executor;
 mod factors;
 mod health;
+mod metrics;
 mod perspective;
 mod statistics;
 mod tables;
@@ -68,8 +69,6 @@ pub enum NetworkStyle {
     Normalised {
         /// What the orthogonal weights of the last layers are multiplied by.
         gain: f64,
-        /// The initial logit of dividing, for groups that act jointly or divide in one way.
-        delegation_logit: f64,
     },
 }
 
@@ -168,6 +167,10 @@ impl Policy for Hierarchy {
         learned.map(|(level, bank)| bank.describe(level)).collect()
     }
 
+    fn metrics(&self) -> Vec<(String, String)> {
+        self.parts.metrics()
+    }
+
     fn partitions(&self) -> Vec<Vec<Vec<AgentId>>> {
         let declaration = &self.parts.declaration;
         let divisions = declaration.levels()[TEAM].divisions_gd.first();
@@ -186,19 +189,16 @@ impl Policy for Hierarchy {
             let Some(bank) = bank else {
                 continue;
             };
+            let network = &bank.network;
             match self.parts.style {
-                NetworkStyle::Plain => bank.network.initialise(&key, &mut parameters),
-                NetworkStyle::Normalised {
-                    gain,
-                    delegation_logit,
-                } => {
-                    let network = &bank.network;
+                NetworkStyle::Plain => network.initialise(&key, &mut parameters),
+                NetworkStyle::Normalised { gain } => {
                     network.initialise_orthogonally(&key, gain, &mut parameters);
-                    if level.acts.is_some() && level.divisions == 1 {
-                        let divide = network.logit_biases().start;
-                        parameters[divide] = crate::Real::from_f64(delegation_logit);
-                    }
                 }
+            }
+            if level.delegation_logit != 0.0 {
+                let divide = &mut parameters[network.logit_biases().start];
+                *divide += <f32 as crate::Real>::from_f64(level.delegation_logit);
             }
         }
         parameters

@@ -2,10 +2,10 @@
 
 use mackrl_env::EntitySet;
 
-use super::{Parts, tables::Decision};
+use super::{Parts, metrics::OfLevel, tables::Decision};
 use crate::{
     Real,
-    policy::{Part, Tally},
+    policy::{Level, Part, Tally},
 };
 
 /// Sums over the steps of the latest episodes.
@@ -17,10 +17,19 @@ pub(crate) struct HierarchyStatistics {
     /// Chosen groups without common knowledge, which can only divide.
     without_common_knowledge: Count,
     known_entities: Count,
-    /// Of each level with a network: its name in metrics, and the entropy of its choices.
-    entropies: Vec<(Option<String>, Count)>,
+    /// Of each level; nothing where there is no network.
+    entropies: Vec<Option<Entropies>>,
     /// Whether some level may act jointly or delegate.
     delegates: bool,
+}
+
+/// How undecided a level is.
+#[derive(Debug, Clone)]
+struct Entropies {
+    names: [String; 2],
+    in_nats: Count,
+    /// In shares of the greatest entropy that a mask allows, where it allows two choices or more.
+    share: Count,
 }
 
 /// A sum and the number of its terms.
@@ -48,20 +57,20 @@ impl HierarchyStatistics {
     pub(crate) fn new(parts: &Parts) -> Self {
         let enemies = parts.spec.entities - parts.spec.agents;
         let levels = parts.declaration.levels();
-        let named = levels.iter().map(|level| {
-            let name = level
-                .is_learned()
-                .then(|| format!("mackrl/entropy_{}", level.name));
-            (name, Count::default())
+        let entropies = levels.iter().map(|level| {
+            let names = || [OfLevel::Entropy, OfLevel::EntropyShare].map(|of| of.name(level));
+            level.is_learned().then(|| Entropies {
+                names: names(),
+                in_nats: Count::default(),
+                share: Count::default(),
+            })
         });
         Self {
             delegated_by_enemies: vec![Count::default(); enemies + 1],
             without_common_knowledge: Count::default(),
             known_entities: Count::default(),
-            entropies: named.collect(),
-            delegates: levels
-                .iter()
-                .any(|level| level.acts.is_some() && level.divisions > 0),
+            entropies: entropies.collect(),
+            delegates: levels.iter().any(Level::delegates),
         }
     }
 
@@ -69,9 +78,9 @@ impl HierarchyStatistics {
         self.delegated_by_enemies.fill(Count::default());
         self.without_common_knowledge = Count::default();
         self.known_entities = Count::default();
-        self.entropies
-            .iter_mut()
-            .for_each(|(_, count)| *count = Count::default());
+        for own in self.entropies.iter_mut().flatten() {
+            (own.in_nats, own.share) = Default::default();
+        }
     }
 
     /// Notes one step of one environment.
@@ -112,19 +121,24 @@ impl HierarchyStatistics {
     }
 
     fn note_entropy(&mut self, decision: &Decision<'_>, part: Part) {
-        let (name, count) = &mut self.entropies[part.level];
-        if name.is_some() {
-            count.add(entropy(decision.table.row(part)));
+        let Some(own) = &mut self.entropies[part.level] else {
+            return;
+        };
+        let row = decision.table.row(part);
+        let entropy = entropy(row);
+        own.in_nats.add(entropy);
+        let choices = row.iter().filter(|log_p| log_p.is_finite()).count();
+        if choices > 1 {
+            own.share.add(entropy / (choices as f64).ln());
         }
     }
 
     /// Adds the sums to `tally`.
     pub(crate) fn report(&self, tally: &mut Tally) {
         let mut add = |name: &str, count: Count| tally.add(name, count.sum, count.terms);
-        for (name, count) in &self.entropies {
-            if let Some(name) = name {
-                add(name, *count);
-            }
+        for own in self.entropies.iter().flatten() {
+            add(&own.names[0], own.in_nats);
+            add(&own.names[1], own.share);
         }
         if !self.delegates {
             return;
@@ -136,6 +150,14 @@ impl HierarchyStatistics {
             add(
                 &format!("mackrl/delegation_rate_ck_enemies_{enemies}"),
                 count,
+            );
+            let cases = Count {
+                sum: count.terms,
+                terms: with_knowledge.terms,
+            };
+            add(
+                &format!("mackrl/delegation_cases_ck_enemies_{enemies}"),
+                cases,
             );
         }
         let known = Count {

@@ -35,6 +35,7 @@ mod step;
 #[cfg(test)]
 mod tests;
 mod trace;
+mod update_length;
 mod values;
 mod weight_gradient;
 
@@ -52,4 +53,5 @@ pub use recurrent::{NetworkSizes, RecurrentNetwork, RecurrentWeights};
 pub use softmax::MaskedLogSoftmax;
 pub(crate) use step::finite_step;
 pub use trace::{BEGINS, Retention, Trace};
+pub use update_length::update_length;
 pub use values::{ValueNetwork, ValueSizes, ValueTrace, ValueWeights};

@@ -18,8 +18,8 @@ use mackrl_env::{Action, AgentId, EpisodeKey, LocalView, Observations};
 use serde::{Deserialize, Serialize};
 
 pub use declaration::{
-    Declaration, Delegation, Division, DivisionBuffer, LEVELS_MAX, Level, Memory, Part, Reads,
-    Selection, TEAM,
+    Declaration, Delegation, Division, DivisionBuffer, Exploring, LEVELS_MAX, Level, Memory, Part,
+    Reads, Selection, TEAM,
 };
 pub use parameters::Parameters;
 pub use table::PolicyTable;
@@ -105,6 +105,12 @@ pub trait Policy: Send + Sync + Debug {
     /// What the networks are made of and what they read, for those who compute with the weights alone; nothing, for a policy
     /// without networks.
     fn description(&self) -> Vec<ControllerDescription> {
+        Vec::new()
+    }
+
+    /// Names (or the parts before a number) and meanings of what its actors report, and of what a learner finds out about its
+    /// controllers.
+    fn metrics(&self) -> Vec<(String, String)> {
         Vec::new()
     }
 

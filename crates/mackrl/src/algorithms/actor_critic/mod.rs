@@ -18,7 +18,7 @@ use crate::{
     critics::{CentralCritic, CriticReport, CriticState},
     experience::{Episode, Piece},
     hierarchy::Hierarchy,
-    nn::{Optimiser, ParameterLayout, finite_step, first_not_finite},
+    nn::{Optimiser, ParameterLayout, finite_step, first_not_finite, update_length},
     objectives::{entropy_regularised, policy_gradient},
     parallel::for_each_in_parallel,
     policy::{Behaviour, Parameters, Policy, Tally},
@@ -35,6 +35,10 @@ const METRICS: &[(&str, &str)] = &[
         "agent_grad_norm",
         "norm of the policy's gradient before clipping",
     ),
+    (
+        "agent_update_length",
+        "root mean square over the policy's parameters of what the step size multiplies, before it is bounded: about 1 while gradients are as large as they have been",
+    ),
     ("advantage_mean", "mean of the advantages A_t"),
     (
         "critic_loss",
@@ -47,40 +51,8 @@ const METRICS: &[(&str, &str)] = &[
     ("td_error_abs", "mean |λ-return − V|"),
     ("target_mean", "mean λ-return"),
     (
-        "mackrl/delegation_rate",
-        "share of chosen pairs with common knowledge that delegated",
-    ),
-    (
-        "mackrl/delegation_rate_ck_enemies_",
-        "the same, for pairs that commonly know this many enemies (Figure 7)",
-    ),
-    (
-        "mackrl/common_knowledge_rate",
-        "share of chosen pairs of living agents with common knowledge",
-    ),
-    (
-        "mackrl/ck_entities_mean",
-        "entities that a chosen pair of living agents commonly knows",
-    ),
-    (
-        "mackrl/entropy_pair_selector",
-        "entropy of the pair selector, in nats",
-    ),
-    (
-        "mackrl/entropy_four_selector",
-        "entropy of the choice between divisions into fours, in nats",
-    ),
-    (
-        "mackrl/entropy_four_controller",
-        "entropy of chosen fours' choice between their partitions into pairs, in nats",
-    ),
-    (
-        "mackrl/entropy_pair_controller",
-        "entropy of chosen pair controllers with common knowledge, in nats",
-    ),
-    (
-        "mackrl/entropy_agent_controller",
-        "entropy of living agents' controllers, in nats",
+        "explained_variance",
+        "1 − Var(λ-return − V) / Var(λ-return), with V as the first sweep meets it: 1 is a perfect critic, 0 one that knows no more than the mean",
     ),
 ];
 
@@ -106,6 +78,8 @@ struct Work<'a> {
     gradient: &'a mut Vec<f32>,
     advantage_bt: &'a [Vec<f32>],
     outcome: Result<f64, Error>,
+    /// Whether its controllers read their input.
+    health: Tally,
 }
 
 impl ActorCritic {
@@ -132,7 +106,7 @@ impl ActorCritic {
     /// How many parameters a team with this hierarchy and its critic have.
     #[must_use]
     pub fn size(hierarchy: &Hierarchy, settings: &ActorCriticSettings, team: Team<'_>) -> usize {
-        let critic = CentralCritic::size(team.spec.state_size, settings.hidden);
+        let critic = CentralCritic::size(team.spec.state_size, settings.critic().hidden);
         hierarchy.layout().len() + critic
     }
 
@@ -148,12 +122,13 @@ impl ActorCritic {
         self.gradients.first().map_or(&[], Vec::as_slice)
     }
 
-    /// Computes the gradient of the loss into the first piece's gradient and returns the loss.
+    /// Computes the gradient of the loss into the first piece's gradient and returns the loss, and whether the controllers read
+    /// their input.
     ///
     /// # Equation
     /// `∇J = 1/N Σ_{b,t} w_{bt} A_{bt} ∇ log p(u_{bt})` (eq. 6): see [`policy_gradient`]; `w` are the weights of
     /// [`LossAverage`](crate::objectives::LossAverage), `1 / Σ_b T_b` unless something else is asked for.
-    fn policy_step(&mut self, batch: &mut [&mut Piece]) -> Result<f64, Error> {
+    fn policy_step(&mut self, batch: &mut [&mut Piece]) -> Result<(f64, Tally), Error> {
         let steps_b: Vec<usize> = self.advantage_bt.iter().map(Vec::len).collect();
         let weights = (self.settings.loss_average)
             .weight_t(&steps_b, self.episode_limit)
@@ -173,6 +148,7 @@ impl ActorCritic {
                     gradient,
                     advantage_bt: own,
                     outcome: Ok(0.0),
+                    health: Tally::default(),
                 }
             })
             .collect();
@@ -181,9 +157,10 @@ impl ActorCritic {
         for_each_in_parallel(self.threads, &mut work, |work| {
             work.outcome = work.differentiate(hierarchy, parameters, &weight_t, entropy_weight);
         });
-        let mut loss = 0.0;
+        let (mut loss, mut health) = (0.0, Tally::default());
         for work in work {
             loss += work.outcome?;
+            health.merge(&work.health);
         }
         if let Some((first, others)) = self.gradients.split_first_mut() {
             for other in others {
@@ -191,7 +168,7 @@ impl ActorCritic {
                 terms.for_each(|(sum, term)| *sum += term);
             }
         }
-        Ok(loss)
+        Ok((loss, health))
     }
 }
 
@@ -206,6 +183,7 @@ impl Work<'_> {
     ) -> Result<f64, Error> {
         self.gradient.fill(0.0);
         let (experience, activations) = hierarchy.evaluate(parameters, self.piece)?;
+        hierarchy.report_health(activations, &mut self.health);
         let mut d_log_p_bt = Vec::new();
         let log_p_bt = activations.log_p_bt();
         let loss = if entropy_weight > 0.0 {
@@ -270,26 +248,35 @@ impl Algorithm for ActorCritic {
         let exploration = batch
             .first()
             .map_or(0.0, |piece| piece.experience.exploration);
-        let loss = self.policy_step(batch)?;
+        let (loss, mut tally) = self.policy_step(batch)?;
         stopwatch.lap(Phase::Backward);
         if !loss.is_finite() {
             let loss = Real::from_f64(loss);
             return Err(NotFinite::new("sum of A log p(u)", &[], loss).into());
         }
-        let rates = [self.settings.learning_rate, self.settings.gradient_norm_max];
-        let (optimiser, layout) = (&mut self.optimiser, self.hierarchy.layout());
         let gradient = &mut self.gradients[0];
+        let length = update_length(&self.optimiser, gradient);
+        let most = self.settings.update_length_max;
+        let shortened = if most > 0.0 && length > most {
+            most / length
+        } else {
+            1.0
+        };
+        let learning_rate = shortened * self.settings.learning_rate;
+        let rates = [learning_rate, self.settings.gradient_norm_max];
+        let (optimiser, layout) = (&mut self.optimiser, self.hierarchy.layout());
         let step = |values: &mut Vec<f32>| finite_step(optimiser, layout, rates, gradient, values);
         let norm = self.parameters.change(step)?;
         self.updates += 1;
         stopwatch.lap(Phase::Optimiser);
         let advantages = self.advantage_bt.iter().flatten();
         let advantage_mean = advantages.map(|&a| f64::from(a)).sum::<f64>() / steps as f64;
-        Ok(report(
+        tally.merge(&report(
             f64::from(exploration),
-            [loss, norm, advantage_mean],
+            [loss, norm, length, advantage_mean],
             critic,
-        ))
+        ));
+        Ok(tally)
     }
 
     fn updates(&self) -> u64 {
@@ -365,17 +352,23 @@ impl Algorithm for ActorCritic {
 }
 
 /// What an update did, under the names of [`METRICS`].
-fn report(exploration: f64, [loss, norm, advantage]: [f64; 3], critic: CriticReport) -> Tally {
+fn report(
+    exploration: f64,
+    [loss, norm, length, advantage]: [f64; 4],
+    critic: CriticReport,
+) -> Tally {
     let mut tally = Tally::default();
     for (name, value) in [
         ("epsilon", exploration),
         ("pg_loss", loss),
         ("agent_grad_norm", norm),
+        ("agent_update_length", length),
         ("advantage_mean", advantage),
         ("critic_loss", critic.loss),
         ("critic_grad_norm", critic.gradient_norm),
         ("td_error_abs", critic.td_error_abs),
         ("target_mean", critic.target_mean),
+        ("explained_variance", critic.explained_variance),
     ] {
         tally.add(name, value, 1.0);
     }

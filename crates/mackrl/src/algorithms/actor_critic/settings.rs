@@ -28,6 +28,8 @@ declare_settings! {
     pub struct ActorCriticSettings {
         /// Units in each hidden layer and each recurrent state.
         hidden: usize = 64, Accepts::integer(1, 4096);
+        /// Units in the critic's hidden layer; 0: as many as `algorithm.hidden`.
+        critic_hidden: usize = 0, Accepts::integer(0, 4096);
         /// ε, a probability, at the first environment step.
         exploration_start: f64 = 0.5, Accepts::within(0.0, 1.0);
         /// ε, a probability, from `algorithm.exploration_steps_env` on; at most `algorithm.exploration_start`.
@@ -61,6 +63,9 @@ declare_settings! {
         target_interval_updates: u64 = 200, Accepts::integer(1, EXACT);
         /// Longest gradient (Euclidean norm over all parameters of the policy, or of the critic); longer ones are shortened.
         gradient_norm_max: f64 = 10.0, Accepts::above(0.0);
+        /// Longest update of the controllers, as the root mean square over all parameters of what the step size multiplies; longer ones are
+        /// shortened. Usual updates have about 1, one with large gradients after a calm up to 10. 0: no bound, as in the authors' code.
+        update_length_max: f64 = 0.0, Accepts::within(0.0, 1000.0);
         /// What a step counts for in the policy's loss: all steps of a batch alike, or, as in the authors' code, those of each time
         /// slot together as much as those of another, so that late steps of long episodes count for more; a buffer has one slot more
         /// than the time limit, so that batches of short episodes count for less.
@@ -99,7 +104,10 @@ impl ActorCriticSettings {
     #[must_use]
     pub fn critic(&self) -> CriticSettings {
         CriticSettings {
-            hidden: self.hidden,
+            hidden: match self.critic_hidden {
+                0 => self.hidden,
+                own => own,
+            },
             optimiser: self.optimiser(),
             learning_rate: self.critic_learning_rate,
             gradient_norm_max: self.gradient_norm_max,

@@ -12,7 +12,7 @@ use crate::{
     Error,
     common_knowledge::CommonKnowledgeFeatures,
     partition::{PartitionSchedule, partition_count},
-    policy::{Declaration, Delegation, Selection},
+    policy::{Declaration, Delegation, Exploring, Selection},
 };
 
 declare_words! {
@@ -42,6 +42,12 @@ declare_settings! {
         selector: Selection = Selection::Learned, Selection::ACCEPTS;
         /// When pairs delegate: their controllers decide, or, as ablations, always, or only where no joint action is commonly known.
         delegation: Delegation = Delegation::Learned, Delegation::ACCEPTS;
+        /// What is added to the logit of delegating, of an untrained pair controller: 0 is the authors' choice; an untrained pair
+        /// delegates about as often as it takes one certain joint action then.
+        delegation_logit: f64 = 0.0, Accepts::within(-1000.0, 1000.0);
+        /// Into whose choices ε is mixed: those of pairs and agents, as in the authors' experiments; those of the pair selector as well;
+        /// or those of agents alone.
+        exploration_levels: Exploring = Exploring::Acting, Exploring::ACCEPTS;
     }
 }
 
@@ -72,13 +78,16 @@ impl MackrlSettings {
     /// # Errors
     /// [`Error::Config`] if the team is too large for the partitions.
     pub fn declaration(&self, team: [usize; 2], seed: u64) -> Result<Declaration, Error> {
-        match self.levels {
+        let declaration = match self.levels {
             Levels::Pairs => {
                 let schedule = self.partitions.into();
                 Declaration::pairwise(team, schedule, self.selector, self.delegation, seed)
             }
             Levels::Fours => Declaration::fours(team, self.selector, self.delegation),
-        }
+        }?;
+        Ok(declaration
+            .with_exploration(self.exploration_levels)
+            .with_delegation_logit(self.delegation_logit))
     }
 }
 

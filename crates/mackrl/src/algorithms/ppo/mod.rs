@@ -218,10 +218,11 @@ fn parts(table: &toml::Table, team: Team<'_>) -> Result<(Hierarchy, PpoSettings,
         let hold = usize::try_from(settings.hold_steps_env).unwrap_or(usize::MAX);
         declaration = declaration.with_partitions_held(hold, settings.memory());
     }
+    declaration = declaration.with_delegation_logit(settings.delegation_logit);
     let own = HierarchySettings {
         common_knowledge: settings.common_knowledge,
         hidden: learning.hidden,
-        networks: style(&learning, settings.delegation_logit),
+        networks: style(&learning),
     };
     let hierarchy = Hierarchy::new(declaration, team.spec, team.prior, own);
     let weighing = match settings.groups {
@@ -239,15 +240,14 @@ fn alone(table: &toml::Table, team: Team<'_>) -> Result<(Hierarchy, PpoSettings)
         // No group reads it.
         common_knowledge: CommonKnowledgeFeatures::default(),
         hidden: settings.hidden,
-        networks: style(&settings, 0.0),
+        networks: style(&settings),
     };
     let hierarchy = Hierarchy::new(declaration, team.spec, team.prior, own);
     Ok((hierarchy, settings))
 }
 
-const fn style(settings: &PpoSettings, delegation_logit: f64) -> NetworkStyle {
+const fn style(settings: &PpoSettings) -> NetworkStyle {
     NetworkStyle::Normalised {
         gain: settings.policy_gain,
-        delegation_logit,
     }
 }

@@ -8,7 +8,7 @@ use crate::{
     objectives::{ReturnSettings, generalised_advantages, lambda_returns},
 };
 
-/// What one sweep did; means over its updates.
+/// What one sweep did: means over its updates, unless something else is said.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CriticReport {
     /// Mean squared error to the λ-returns.
@@ -19,6 +19,9 @@ pub struct CriticReport {
     pub td_error_abs: f64,
     /// Mean λ-return.
     pub target_mean: f64,
+    /// `1 − Var(λ-return − V) / Var(λ-return)` over the states of the batch, V being what its *first* sweep met; 0 where λ-returns do
+    /// not vary.
+    pub explained_variance: f64,
 }
 
 /// What a sweep keeps of one episode.
@@ -28,6 +31,25 @@ struct Sweep {
     return_t: Vec<f32>,
     /// V of all states \[T + 1\], each as it was when the sweep passed it.
     value_t: Vec<f32>,
+}
+
+/// `1 − Var(λ-return − V) / Var(λ-return)`, 0 where λ-returns do not vary.
+fn explained(sweeps: &[Sweep]) -> f64 {
+    let states = (sweeps.iter()).flat_map(|sweep| sweep.return_t.iter().zip(&sweep.value_t));
+    let (mut count, mut returns, mut errors) = (0.0, [0.0; 2], [0.0; 2]);
+    for (&return_, &value) in states {
+        let (return_, error) = (f64::from(return_), f64::from(return_ - value));
+        count += 1.0;
+        returns = [returns[0] + return_, returns[1] + return_ * return_];
+        errors = [errors[0] + error, errors[1] + error * error];
+    }
+    let variance = |[sum, squares]: [f64; 2]| squares / count - (sum / count).powi(2);
+    let of_returns = variance(returns);
+    if of_returns > 0.0 {
+        1.0 - variance(errors) / of_returns
+    } else {
+        0.0
+    }
 }
 
 /// A state of a batch: the episode and the time.
@@ -57,6 +79,7 @@ impl CentralCritic {
         advantage_bt: &mut Vec<Vec<f32>>,
     ) -> Result<CriticReport, NotFinite> {
         let mut report = CriticReport::default();
+        let mut explained_variance = None;
         let mut sweeps = Vec::new();
         for _ in 0..self.settings.sweeps {
             if self.refresh_target_if_due() || sweeps.is_empty() {
@@ -67,7 +90,9 @@ impl CentralCritic {
                 sweep.value_t[episode.steps()] = self.value_of_end(episode);
             }
             report = self.sweep(episodes, &mut sweeps)?;
+            explained_variance.get_or_insert_with(|| explained(&sweeps));
         }
+        report.explained_variance = explained_variance.unwrap_or(0.0);
         if self.settings.minibatch == CriticMinibatch::Batch {
             for (sweep, episode) in sweeps.iter_mut().zip(episodes) {
                 let steps = episode.steps();

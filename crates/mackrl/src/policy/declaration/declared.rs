@@ -100,6 +100,7 @@ impl Declaration {
             selection: Selection::Learned,
             reads: Reads::CommonKnowledgeAndMembers,
             explores: false,
+            delegation_logit: 0.0,
             memory: Memory::Episode,
             active: Vec::new(),
         };
@@ -171,6 +172,7 @@ fn team(agents: usize, divisions: Vec<Division>) -> Level {
         selection: Selection::Learned,
         reads: Reads::CommonKnowledge,
         explores: false,
+        delegation_logit: 0.0,
         memory: Memory::Episode,
         active: Vec::new(),
     }
@@ -198,6 +200,7 @@ fn pairs(agents: usize, below: usize, delegation: Delegation) -> Level {
         selection: Selection::Learned,
         reads: Reads::CommonKnowledgeAndMembers,
         explores: true,
+        delegation_logit: 0.0,
         memory: Memory::Episode,
         active: Vec::new(),
     }
@@ -213,6 +216,7 @@ fn alone(agents: usize) -> Level {
         selection: Selection::Learned,
         reads: Reads::OwnObservation,
         explores: true,
+        delegation_logit: 0.0,
         memory: Memory::Episode,
         active: Vec::new(),
     }

@@ -45,6 +45,19 @@ declare_words! {
     }
 }
 
+declare_words! {
+    /// Into whose choices exploration is mixed.
+    pub enum Exploring {
+        /// Those of groups that may act: pairs and agents. Who chooses between divisions alone does not explore.
+        #[default]
+        Acting = "acting",
+        /// Those of all groups.
+        All = "all",
+        /// Those of single agents.
+        Agents = "agents",
+    }
+}
+
 /// What the controllers of a level read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reads {
@@ -104,6 +117,8 @@ pub struct Level {
     pub reads: Reads,
     /// Whether exploration is mixed into its choices.
     pub explores: bool,
+    /// Of groups that act jointly or divide instead: what is added to an untrained controller's logit of dividing.
+    pub delegation_logit: f64,
     /// How long its controllers remember.
     pub memory: Memory,
     /// Groups that some division of an earlier level contains, ascending.
@@ -161,6 +176,12 @@ impl Level {
         self.selection == Selection::Learned
             && !self.groups.is_empty()
             && (self.acts.is_some() || self.divisions > 1)
+    }
+
+    /// Whether a group may act jointly, or divide instead.
+    #[must_use]
+    pub const fn delegates(&self) -> bool {
+        self.acts.is_some() && self.divisions > 0
     }
 
     /// Whether a group with a dead member has no choice left: it knows nothing in common and divides in one way, or it is the
@@ -238,6 +259,30 @@ impl Declaration {
         let alone = self.alone();
         for level in &mut self.levels[TEAM + 1..alone] {
             level.memory = memory;
+        }
+        self
+    }
+
+    /// The same hierarchy with exploration mixed into the choices of other levels.
+    #[must_use]
+    pub fn with_exploration(mut self, exploring: Exploring) -> Self {
+        let alone = self.alone();
+        for (place, level) in self.levels.iter_mut().enumerate() {
+            level.explores = match exploring {
+                Exploring::Acting => level.acts.is_some(),
+                Exploring::All => true,
+                Exploring::Agents => place == alone,
+            };
+        }
+        self
+    }
+
+    /// The same hierarchy with `logit` added to the logit of dividing, in untrained controllers of groups that act jointly or divide
+    /// instead.
+    #[must_use]
+    pub fn with_delegation_logit(mut self, logit: f64) -> Self {
+        for level in &mut self.levels {
+            level.delegation_logit = if level.delegates() { logit } else { 0.0 };
         }
         self
     }
