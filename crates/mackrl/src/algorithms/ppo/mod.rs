@@ -8,7 +8,7 @@
 //!
 //! What is like MAPPO's code, and what is not:
 //! 1. clipped surrogate, of each group's ratio; the advantage of a group is the mean of its members';
-//! 2. generalised advantages (γ .99, λ .95) of whole episodes, normalised over the batch and its living agents; time running out
+//! 2. generalised advantages (γ .99, λ .9; .95 there) of whole episodes, normalised over the batch and its living agents; time running out
 //!    counts as an end;
 //! 3. values in units of returns, clipped (.2), with Huber's loss (10); not recurrent, where MAPPO's are;
 //! 4. entropy of the *marginal*: what a group does over all ways to it;

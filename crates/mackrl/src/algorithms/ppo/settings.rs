@@ -65,7 +65,7 @@ declare_settings! {
         /// Discount γ of one environment step.
         gamma: f64 = 0.99, Accepts::within(0.0, 1.0);
         /// λ of the generalised advantages: 0 looks one step ahead, 1 to the end of the episode.
-        lambda: f64 = 0.95, Accepts::within(0.0, 1.0);
+        lambda: f64 = 0.9, Accepts::within(0.0, 1.0);
         /// Weight of the entropy of what each group does, over all ways to it, beside its normalised advantage, at the first
         /// environment step.
         entropy_weight: f64 = 0.02, Accepts::within(0.0, 1.0);
