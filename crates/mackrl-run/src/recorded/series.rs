@@ -130,7 +130,7 @@ fn series(runs: Vec<RecordedRun>, selection: &Selection) -> Vec<Series> {
         let algorithm = run.algorithm();
         let key = (
             run.config.env.map().to_owned(),
-            usize::from(algorithm != "mackrl"),
+            usize::from(!algorithm.starts_with("mackrl")),
             name(&run, selection),
         );
         series.entry(key).or_default().push(run);
@@ -260,7 +260,7 @@ mod tests {
     use super::*;
 
     fn run(settings: &[&str]) -> RecordedRun {
-        let config = Config::with(settings).unwrap();
+        let config = Config::with(&[&["algorithm.name=mackrl"], settings].concat()).unwrap();
         RecordedRun {
             misses_rows: false,
             path: PathBuf::from(settings.join(" ")),
