@@ -11,12 +11,13 @@ use crate::{
 };
 
 /// Settings in which runs may differ and still be compared.
-const FREE: [&str; 6] = [
+const FREE: [&str; 7] = [
     "algorithm.name",
     "run.seed",
-    // These two change no result.
+    // These three change no result.
     "run.checkpoint_interval_steps_env",
     "run.checkpoints_kept",
+    "run.weights_interval_steps_env",
     // Maps are never compared with each other.
     "env.map",
     "env.name",
@@ -263,6 +264,7 @@ mod tests {
         let config = Config::with(&[&["algorithm.name=mackrl"], settings].concat()).unwrap();
         RecordedRun {
             misses_rows: false,
+            teams: None,
             path: PathBuf::from(settings.join(" ")),
             provenance: vec![Provenance::of_run(&config)],
             config,
