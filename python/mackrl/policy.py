@@ -13,14 +13,16 @@ from numpy.typing import NDArray
 
 from . import _native
 from .arrays import Buffers, Spec
+from .runs import Checkpoint
 from .vector import Stream
 
 __all__ = ["Agent", "Level", "Play", "Tables", "Team", "load", "read_weights"]
 
 
-def load(run: str | os.PathLike[str]) -> Team:
-    """The team of a run folder, with its weights at the end or those of its latest checkpoint."""
-    return Team(run)
+def load(run: str | os.PathLike[str], checkpoint: Checkpoint = "last") -> Team:
+    """The team of a run folder with its weights: the ``"last"`` ones (at the end, or those of the latest checkpoint), those that did
+    ``"best"`` in a test, or those that were kept at a number of steps."""
+    return Team(run, checkpoint)
 
 
 def read_weights(content: bytes) -> tuple[dict[str, NDArray[np.float32]], dict[str, str]]:
@@ -64,8 +66,8 @@ class Tables:
 class Team:
     """A team that was trained. ``load`` makes it."""
 
-    def __init__(self, run: str | os.PathLike[str]) -> None:
-        self._team = _native.Team(os.fspath(run))
+    def __init__(self, run: str | os.PathLike[str], checkpoint: Checkpoint = "last") -> None:
+        self._team = _native.Team(os.fspath(run), str(checkpoint))
         self.spec = Spec._of(self._team.spec())
         self.config: dict[str, Any] = json.loads(self._team.config())
         self.weights: Mapping[str, NDArray[np.float32]]

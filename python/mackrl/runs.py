@@ -9,7 +9,7 @@ import math
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,9 @@ class Progress:
 
 
 Listener = Callable[[Progress], object]
+
+Checkpoint = Literal["last", "best"] | int
+"""Which weights of a run: the last, those that did best in a test, or those that were kept at a number of steps."""
 
 
 def train(
@@ -125,25 +128,48 @@ class Run:
         names = dict.fromkeys(name for row in rows for name, value in row.items() if not isinstance(value, str))
         return {name: np.array([row.get(name, math.nan) for row in rows], np.float64) for name in names}
 
+    @property
+    def teams(self) -> dict[str, Any] | None:
+        """Of a finished run, how its ``"last"`` and its ``"best"`` weights play in episodes that neither training nor tests have seen:
+        ``"steps_env"``, ``"mean"``, ``"standard_error"`` and ``"episodes"`` of each, and under ``"measure"`` what was measured."""
+        teams: dict[str, Any] | None = json.loads(_native.run_description(self.folder)[2])
+        return teams
+
     def config(self) -> dict[str, Any]:
         """The whole configuration."""
         config: dict[str, Any] = json.loads(_native.run_description(self.folder)[1])
         return config
 
-    def team(self) -> Team:
-        """The team with its weights: those at the end, or those of the latest checkpoint."""
+    def team(self, checkpoint: Checkpoint = "last") -> Team:
+        """The team with its weights: the ``"last"`` ones, those that did ``"best"`` in a test, or those that were kept at a number of
+        steps, as the setting ``run.weights_interval_steps_env`` asks for."""
         from .policy import load
 
-        return load(self)
+        return load(self, checkpoint)
 
-    def evaluate(self, episodes: int = 320, *, seed: int | None = None, threads: int | None = None) -> dict[str, float]:
+    def evaluate(
+        self,
+        episodes: int = 320,
+        *,
+        seed: int | None = None,
+        threads: int | None = None,
+        checkpoint: Checkpoint = "last",
+    ) -> dict[str, float]:
         """Plays greedy episodes: means and standard errors under the names of ``mackrl evaluate --json``."""
-        result: dict[str, float] = json.loads(_native.evaluate(self.folder, episodes, seed, count_of(threads)))
+        played = _native.evaluate(self.folder, episodes, seed, count_of(threads), str(checkpoint))
+        result: dict[str, float] = json.loads(played)
         return result
 
-    def replay(self, episode: int = 0, *, seed: int | None = None, exploration: float | None = None) -> Replay:
+    def replay(
+        self,
+        episode: int = 0,
+        *,
+        seed: int | None = None,
+        exploration: float | None = None,
+        checkpoint: Checkpoint = "last",
+    ) -> Replay:
         """Plays an episode of ``evaluate`` again and keeps it: greedy, or sampled with ``exploration`` in [0, 1]."""
-        return Replay(_native.record_policy(self.folder, seed, episode, exploration))
+        return Replay(_native.record_policy(self.folder, seed, episode, exploration, str(checkpoint)))
 
     def __fspath__(self) -> str:
         return os.fspath(self.folder)

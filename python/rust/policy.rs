@@ -57,8 +57,9 @@ fn behaviour(exploration: Option<f64>) -> PyResult<Behaviour> {
 #[pymethods]
 impl Team {
     #[new]
-    fn new(path: PathBuf) -> PyResult<Self> {
-        let run = Run::open(&path).map_err(IntoException::into_exception)?;
+    fn new(path: PathBuf, checkpoint: &str) -> PyResult<Self> {
+        let which = crate::runs::which(checkpoint)?;
+        let run = Run::open(&path, which).map_err(IntoException::into_exception)?;
         let world = RunWorld::new(&run.config).map_err(learning)?;
         let algorithm = trained(&run.config, &world, &run.weights).map_err(learning)?;
         Ok(Self {

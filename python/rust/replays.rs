@@ -25,9 +25,11 @@ pub(crate) fn record_policy<'py>(
     seed: Option<u64>,
     episode: u64,
     exploration: Option<f64>,
+    checkpoint: &str,
 ) -> PyResult<Bound<'py, PyBytes>> {
+    let which = crate::runs::which(checkpoint)?;
     let recorded = py.detach(|| -> Result<Vec<u8>, RunError> {
-        let run = Run::open(&path)?;
+        let run = Run::open(&path, which)?;
         let seed = seed.unwrap_or(run.config.run.seed);
         let key = EpisodeKey::new(seed, Stream::Evaluation, episode);
         let behaviour = exploration.map_or(Behaviour::GREEDY, Behaviour::sampled);

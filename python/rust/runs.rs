@@ -10,12 +10,12 @@ use std::{
 use mackrl_run::{
     RunError,
     config::Config,
-    run_folder::{Run, read_description, read_rows},
+    run_folder::{Description, Run, WhichWeights, read_description, read_rows},
     stop_request::StopRequest,
     training::{Episodes, assembly::RunWorld, evaluate_in},
     training_loop::{self, Observer, Standing, Summary},
 };
-use pyo3::prelude::*;
+use pyo3::{exceptions::PyValueError, prelude::*};
 
 use crate::{
     configuration::Layers,
@@ -161,6 +161,12 @@ fn pass_on(
     Ok(())
 }
 
+/// The weights that are called so: `last`, `best`, or a number of steps.
+pub(crate) fn which(checkpoint: &str) -> PyResult<WhichWeights> {
+    (checkpoint.parse())
+        .map_err(|problem: String| PyValueError::new_err(format!("checkpoint is {problem}")))
+}
+
 /// Plays greedy episodes with the team of the run at `path`; gives means and standard errors as JSON.
 #[pyfunction]
 pub(crate) fn evaluate(
@@ -169,9 +175,11 @@ pub(crate) fn evaluate(
     episodes: usize,
     seed: Option<u64>,
     threads: usize,
+    checkpoint: &str,
 ) -> PyResult<String> {
+    let which = which(checkpoint)?;
     py.detach(|| -> Result<String, RunError> {
-        let run = Run::open(Path::new(&path))?;
+        let run = Run::open(Path::new(&path), which)?;
         let chosen = Episodes {
             count: episodes,
             seed: seed.unwrap_or(run.config.run.seed),
@@ -183,13 +191,18 @@ pub(crate) fn evaluate(
     .map_err(IntoException::into_exception)
 }
 
-/// How far the run at `path` has come, and its configuration, as JSON.
+/// How far the run at `path` has come, its configuration, and how its teams play, as JSON.
 #[pyfunction]
-pub(crate) fn run_description(py: Python<'_>, path: PathBuf) -> PyResult<(String, String)> {
+pub(crate) fn run_description(py: Python<'_>, path: PathBuf) -> PyResult<(String, String, String)> {
     let (config, description) = py
         .detach(|| read_description(&path))
         .map_err(IntoException::into_exception)?;
-    Ok((crate::json(&description.status), crate::json(&config)))
+    let Description { status, teams, .. } = description;
+    Ok((
+        crate::json(&status),
+        crate::json(&config),
+        crate::json(&teams),
+    ))
 }
 
 /// The rows of metrics of the run at `path`, as JSON.

@@ -87,6 +87,25 @@ def test_a_played_episode_is_that_of_evaluate_and_replay(runs: dict[str, mackrl.
         shown = env.step(recorded[None])
 
 
+def test_the_best_team_and_those_kept_on_the_way_are_loaded_by_name(tmp_path: Path) -> None:
+    settings = {"test.episodes": 2, "test.interval_steps_env": 300, "run.weights_interval_steps_env": 400}
+    run = mackrl.train("3m", steps=900, out=tmp_path / "run", settings=settings, progress=False)
+    assert run.teams is not None
+    for checkpoint in ("last", "best"):
+        score = run.teams[checkpoint]
+        team = run.team(checkpoint)
+        assert team.metadata["trained_steps_env"] == str(score["steps_env"])
+        played = run.evaluate(score["episodes"], checkpoint=checkpoint)
+        assert played[f"test_{run.teams['measure']}_mean"] == score["mean"]
+    kept = mackrl.policy.load(run, 400)
+    assert 400 <= int(kept.metadata["trained_steps_env"]) < 800
+    assert run.replay(checkpoint=400).summary["ep_length"] > 0
+    with pytest.raises(ValueError, match="keeps no weights `500`, the nearest are 400; there are: last, best, 400, 800"):
+        run.team(500)
+    with pytest.raises(ValueError, match="checkpoint is `bets`, expected last, best or a number of steps"):
+        run.team("bets")  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize(("trained", "name"), TEAMS)
 def test_numpy_computes_the_same_probabilities(request: pytest.FixtureRequest, trained: str, name: str) -> None:
     run = request.getfixturevalue(trained)[name]

@@ -239,6 +239,13 @@ fn of_run(error: &RunError) -> Verdict {
                     .to_owned(),
             ),
         ),
+        RunError::NoSuchWeights { .. } => (
+            Exit::Usage,
+            Some(
+                "run.weights_interval_steps_env=N keeps weights every N steps; a run's first test chooses its best"
+                    .to_owned(),
+            ),
+        ),
         RunError::OtherConfiguration { .. } => (
             Exit::Usage,
             Some("choose another folder with --out, or move this run away".to_owned()),

@@ -3,7 +3,7 @@
 //! This crate holds no algorithm. `args` is what was typed, `commands` what it means, `reproduce` one command for each figure
 //! of the paper, `plot` the drawing of its results, `replay` the looking into recorded episodes, `serve` runs in the browser;
 //! runs themselves, on disk and side by side, are `mackrl_run`'s.
-//! `progress` is what a person sees while waiting, `signals` how a person stops waiting, `failure` the one place that turns errors into exit codes. Data go to stdout, everything else to stderr.
+//! `progress` is what a person sees while waiting, `words` how a result reads, `signals` how a person stops waiting, `failure` the one place that turns errors into exit codes. Data go to stdout, everything else to stderr.
 
 mod args;
 mod commands;
@@ -17,6 +17,7 @@ mod reproduce;
 #[cfg(feature = "serve")]
 mod serve;
 mod signals;
+mod words;
 
 use std::process::ExitCode;
 

@@ -99,9 +99,9 @@ fn a_disk_that_takes_no_more_stops_the_run_and_loses_nothing() {
     let undisturbed = parent.path().join("undisturbed");
     exits(train(&undisturbed, &settings), 0);
     let expected = outcome(&undisturbed);
-    // No room for the first checkpoint; for some rows of metrics; for most.
+    // No room for the best weights or the first checkpoint; for some rows of metrics; for most.
     for (blocks, at) in [
-        (20, "tensors.safetensors"),
+        (20, ".safetensors"),
         (50, "metrics.jsonl"),
         (80, "metrics.jsonl"),
     ] {

@@ -71,6 +71,8 @@ fn help_teaches_every_command() {
         "reproduce figure7",
         "reproduce ablations",
         "reproduce all",
+        "reproduce ppo",
+        "reproduce zoo",
         "play",
         "fidelity",
         "replay",
@@ -128,7 +130,8 @@ fn the_instruction_set_is_named_wherever_speed_is_told() {
         }
         let trained = tell(&format!("train --map 3m --steps 1 --threads 1 --out {set}"));
         let first = trained.stderr.lines().next();
-        let expected = format!("mackrl-ppo on 3m, computing with {set} on 1 thread");
+        let expected =
+            format!("mackrl-ppo (preset default) on 3m, computing with {set} on 1 thread");
         assert_eq!(first, Some(&*expected));
         let record = std::fs::read_to_string(folder.path().join(set).join("run.json"));
         assert_eq!(json(&record.expect("a record"))["simd"], set);

@@ -7,7 +7,7 @@ use std::{fmt::Write as _, io, path::PathBuf};
 use mackrl::NotFinite;
 use thiserror::Error;
 
-use crate::config::ConfigError;
+use crate::{config::ConfigError, run_folder::WhichWeights};
 
 /// What this crate's functions give.
 pub type Result<T, E = RunError> = std::result::Result<T, E>;
@@ -98,6 +98,18 @@ pub enum RunError {
         /// How many there are.
         runs: usize,
     },
+    /// Weights that a run does not keep.
+    #[error("{} keeps no weights `{asked}`{}; there are: {there}", folder.display(), suggested(nearest.as_ref()))]
+    NoSuchWeights {
+        /// Its folder.
+        folder: PathBuf,
+        /// Which were asked for.
+        asked: WhichWeights,
+        /// Those of the nearest number of steps, if a number was asked for and there are any.
+        nearest: Option<WhichWeights>,
+        /// Those that it has, in words.
+        there: String,
+    },
     /// A metric that a run does not have.
     #[error("{message}")]
     MissingMetric {
@@ -187,6 +199,13 @@ impl RunError {
     pub const fn is_missing_metric(&self) -> bool {
         matches!(self, Self::MissingMetric { .. })
     }
+}
+
+/// ", the nearest are 50000"
+fn suggested(nearest: Option<&WhichWeights>) -> String {
+    nearest.map_or_else(String::new, |nearest| {
+        format!(", the nearest are {nearest}")
+    })
 }
 
 /// Says what could not be done.

@@ -108,6 +108,7 @@ impl Scene {
     fn on(map: &str) -> Self {
         let settings = [
             &format!("env.map={map}"),
+            "algorithm.name=mackrl",
             "algorithm.partitions=round-robin",
         ];
         let config = Config::with(&settings).expect("a map of this program");

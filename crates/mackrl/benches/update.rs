@@ -39,7 +39,8 @@ struct Lesson {
 
 impl Lesson {
     fn new() -> Self {
-        let config = Config::default();
+        let config =
+            Config::with(&["algorithm.name=mackrl"]).expect("an algorithm of this program");
         let world = RunWorld::new(&config).expect("3m is a map of this program");
         let team = assembly::algorithm(&config, &world, 1).expect("as above");
         let environments = world.environments(ENVIRONMENTS);

@@ -6,6 +6,7 @@ use mackrl_run::{config::Config, training::Trainer};
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let config = Config::with(&[
         "env.name=matrix-game",
+        "algorithm.name=mackrl",
         "env.common_knowledge=0.7",
         "algorithm.environments=32",
         "algorithm.learning_rate=0.001",

@@ -89,7 +89,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             tell(&format!("{name}: {what}"), bits(numbers));
         }
     }
-    let mut trainer = Trainer::new(&Config::with(&["env.map=3m", "run.steps_env=1000"])?, 1)?;
+    let mut trainer = Trainer::new(
+        &Config::with(&["algorithm.name=mackrl", "run.steps_env=1000"])?,
+        1,
+    )?;
     while !trainer.finished() {
         trainer.update()?;
     }

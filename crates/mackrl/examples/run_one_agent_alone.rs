@@ -12,7 +12,7 @@ use mackrl_run::{
 };
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let config = Config::with(&["env.map=3m"])?;
+    let config = Config::with(&["env.map=3m", "algorithm.name=mackrl"])?;
     let world = RunWorld::new(&config)?;
     let team = assembly::algorithm(&config, &world, 1)?;
     let (policy, parameters) = (team.policy(), team.parameters());

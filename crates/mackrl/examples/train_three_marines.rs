@@ -6,6 +6,7 @@ use mackrl_run::{config::Config, training::Trainer};
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let config = Config::with(&[
         "env.map=3m",
+        "algorithm.name=mackrl",
         "run.steps_env=25000",
         "run.metrics_interval_steps_env=1000000",
         "test.interval_steps_env=5000",

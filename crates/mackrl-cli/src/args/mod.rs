@@ -24,7 +24,7 @@ use mackrl_run::provenance::CODE;
 
 use crate::reproduce::{
     ablations::AblationOptions, all::AllOptions, figure5::Figure5Options, figure6::Figure6Options,
-    figure7::Figure7Options,
+    figure7::Figure7Options, ppo::PpoOptions, zoo::ZooOptions,
 };
 pub(crate) use analysis::{CurveAxis, CurveStatistic, PlotArgs, ReportArgs};
 pub(crate) use bench::{
@@ -109,7 +109,7 @@ pub(crate) enum Command {
     Sc2(Sc2Args),
 }
 
-/// Reproduce the figures of the paper, and judge what the paper says about them
+/// Reproduce the figures of the paper and of this project, and judge what is said about them
 ///
 /// Example: mackrl reproduce figure5 --out runs/figure5
 #[derive(Debug, Args)]
@@ -125,6 +125,8 @@ pub(crate) enum Figure {
     Figure7(Figure7Options),
     Ablations(AblationOptions),
     All(AllOptions),
+    Ppo(PpoOptions),
+    Zoo(ZooOptions),
 }
 
 /// List SMAC's maps with the sizes of their arrays, show one of them, or check a scenario of your own

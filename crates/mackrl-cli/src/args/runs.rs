@@ -3,14 +3,20 @@
 use std::{num::NonZeroUsize, path::PathBuf};
 
 use clap::Args;
+use mackrl_run::run_folder::WhichWeights;
 
 use crate::args::{ConfigurationArgs, EPISODES_MOST, count_to};
 
 /// Train a team, and write its weights, metrics and configuration into a run folder
 ///
 /// The folder holds config.toml (everything that determines the result), metrics.jsonl (one JSON object a line),
-/// weights.safetensors (readable from PyTorch), checkpoints/ (from which an interrupted run goes on) and run.json (command,
-/// version, status). A folder that holds a run is never overwritten. The number of threads changes the speed and nothing else.
+/// weights.safetensors (the last, readable from PyTorch), weights/ (those that did best in a test, and more with
+/// run.weights_interval_steps_env), checkpoints/ (from which an interrupted run goes on) and run.json (command, version, status,
+/// how the last and the best weights play). A folder that holds a run is never overwritten. The number of threads changes the
+/// speed and nothing else.
+///
+/// At the end the last weights and the best play battles that neither training nor tests have seen; what they win is what
+/// `mackrl evaluate` says of them.
 ///
 /// SIGINT (Ctrl-C), SIGTERM and SIGUSR1 write a checkpoint and stop with exit code 75; a second SIGINT stops at once.
 ///
@@ -58,15 +64,19 @@ pub(crate) struct ResumeArgs {
 
 /// Play greedy episodes with a trained team and report how it does
 ///
-/// Prints the mean and the standard error of battles won, return and episode length. --save-replays keeps some of the episodes,
-/// with all that the controllers computed; `mackrl replay` and `mackrl explain` show them.
+/// Says first how often it wins, then prints mean and standard error of battles won, return and episode length. Without
+/// --checkpoint the last weights play; if those that did best in a test are better by more than chance, that is said.
+/// --save-replays keeps some of the episodes, with all that the controllers computed; `mackrl replay` and `mackrl explain` show them.
 ///
-/// Example: mackrl evaluate runs/3m-mackrl-ppo-seed1 --episodes 320 --save-replays 3 --json
+/// Examples: mackrl evaluate runs/3m-mackrl-ppo-seed1 --save-replays 3; mackrl evaluate runs/3m-mackrl-ppo-seed1 --checkpoint best --json
 #[derive(Debug, Args)]
 pub(crate) struct EvaluateArgs {
     /// Run folder that `mackrl train` wrote
     #[arg(value_name = "DIR")]
     pub(crate) run: PathBuf,
+
+    #[command(flatten)]
+    pub(crate) weights: WeightsArgs,
 
     /// Episodes to play
     #[arg(long, value_name = "N", default_value = "320", value_parser = count_to(EPISODES_MOST))]
@@ -76,7 +86,7 @@ pub(crate) struct EvaluateArgs {
     #[arg(long, value_name = "S")]
     pub(crate) seed: Option<u64>,
 
-    /// Keep the first N of the episodes as DIR/replays/seedS-episodeI.replay.gz
+    /// Keep the first N of the episodes as DIR/replays/seedS-episodeI.replay.gz, after the name of weights that are not the last
     #[arg(long, value_name = "N", default_value = "0", hide_default_value = true)]
     pub(crate) save_replays: usize,
 
@@ -104,6 +114,9 @@ pub(crate) struct CertifyArgs {
     #[arg(value_name = "DIR")]
     pub(crate) run: PathBuf,
 
+    #[command(flatten)]
+    pub(crate) weights: WeightsArgs,
+
     /// Episodes to compare in each mode, sampled and greedy
     #[arg(long, value_name = "N", default_value = "100", value_parser = count_to(EPISODES_MOST))]
     pub(crate) episodes: NonZeroUsize,
@@ -119,6 +132,15 @@ pub(crate) struct CertifyArgs {
     /// Print a JSON object instead of a table
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// Which weights of a run are used.
+#[derive(Debug, Args)]
+pub(crate) struct WeightsArgs {
+    /// Weights to use: last, best (in the tests of training), or a number of steps N at which the run kept some, as
+    /// run.weights_interval_steps_env asks for
+    #[arg(long, value_name = "WHICH", default_value_t)]
+    pub(crate) checkpoint: WhichWeights,
 }
 
 #[derive(Debug, Args)]
@@ -173,6 +195,17 @@ mod tests {
     fn evaluation_and_certificate_have_the_usual_lengths() {
         assert_eq!(typed::<EvaluateArgs>("evaluate x").episodes.get(), 320);
         assert_eq!(typed::<CertifyArgs>("certify x").episodes.get(), 100);
+    }
+
+    #[test]
+    fn weights_are_the_last_unless_others_are_asked_for() {
+        let which = |line| typed::<EvaluateArgs>(line).weights.checkpoint;
+        assert_eq!(which("evaluate x"), WhichWeights::Last);
+        assert_eq!(which("evaluate x --checkpoint best"), WhichWeights::Best);
+        let certify: CertifyArgs = typed("certify x --checkpoint 50000");
+        assert_eq!(certify.weights.checkpoint, WhichWeights::Step(50_000));
+        let line = ["evaluate", "x", "--checkpoint", "bets"];
+        assert!(Typed::<EvaluateArgs>::try_parse_from(line).is_err());
     }
 
     #[test]

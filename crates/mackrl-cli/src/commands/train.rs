@@ -6,40 +6,88 @@ use mackrl::nn::InstructionSet;
 use mackrl_run::{
     config::Config,
     run_folder::RunFolder,
+    training::Teams,
     training_loop::{self, Summary},
 };
 
-use crate::{args::TrainArgs, commands::sc2, output, progress::RunProgress, signals};
+use crate::{
+    args::TrainArgs,
+    commands::sc2,
+    output,
+    progress::RunProgress,
+    signals,
+    words::{between, did},
+};
+
+/// How many of the latest tests are spoken of.
+const TESTS_SHOWN: usize = 5;
 
 /// Trains a team. Everything that can be wrong with what was typed is found before the run folder is created.
 pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<()> {
-    let config = args.configuration.layers()?.build()?;
+    let resolved = args.configuration.layers()?.resolve()?;
+    let config = resolved.config().clone();
     let path = args.out.clone().unwrap_or_else(|| default_folder(&config));
     RunFolder::check_free(&path)?;
     let stop = signals::listen()?;
     let world = sc2::world(&config)?;
     let threads = args.threads.count();
     let mut progress = RunProgress::new();
-    progress.announce(&config, InstructionSet::chosen()?, threads);
+    let why = resolved.origin("algorithm.name");
+    progress.announce(&config, &why, InstructionSet::chosen()?, threads);
     let summary = training_loop::train(&path, &config, &world, threads, &stop, &mut progress)?;
     print(&summary, args.json)
 }
 
-/// Prints what a finished run says of itself.
+/// Prints what a finished run says of itself: how its team plays, then what it cost, then what to do next.
 pub(super) fn print(summary: &Summary, json: bool) -> anyhow::Result<()> {
     if json {
         return output::print_json(summary);
     }
-    let won = summary.battle_won_mean.map_or_else(String::new, |won| {
-        format!("; the team wins {:.0} % of its last test", 100.0 * won)
-    });
+    let folder = summary.folder.display();
     output::print(&format!(
-        "{}: {} environment steps in {:.1} s ({:.0} a second){won}\n",
-        summary.folder.display(),
+        "{}{folder}: {} environment steps in {:.1} s ({:.0} a second)\nnext: mackrl evaluate {folder}{}\n",
+        playing(&summary.teams, &summary.tests),
         summary.steps_env,
         summary.wall_s,
-        summary.steps_per_s
+        summary.steps_per_s,
+        match summary.teams.better() {
+            Some(_) => " --checkpoint best",
+            None => " --save-replays 3",
+        },
     ))
+}
+
+/// How the last weights and the best play, in sentences.
+fn playing(teams: &Teams, tests: &[f64]) -> String {
+    let Teams {
+        measure,
+        last,
+        best,
+    } = teams;
+    let mut text = format!("The team {} that it had not seen.\n", did(measure, last));
+    let recent = &tests[tests.len().saturating_sub(TESTS_SHOWN)..];
+    if recent.len() == TESTS_SHOWN {
+        let [least, most] = [f64::min, f64::max].map(|of| recent.iter().copied().reduce(of));
+        let [least, most] = [least, most].map(|share| share.unwrap_or_default());
+        text += &format!(
+            "Its last {TESTS_SHOWN} tests {}.\n",
+            between(measure, least, most)
+        );
+    }
+    match best {
+        Some(best) if best.steps_env == last.steps_env => {
+            text += "No earlier weights did better in a test.\n";
+        }
+        Some(best) => {
+            text += &format!(
+                "The best in a test were the weights of step {}, which {} as well.\n",
+                best.steps_env,
+                did(measure, best)
+            );
+        }
+        None => {}
+    }
+    text
 }
 
 /// Where a run lies if nothing else is asked for.
@@ -57,6 +105,8 @@ fn default_folder(config: &Config) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
+    use mackrl_run::training::Score;
+
     use super::*;
 
     #[test]
@@ -65,5 +115,30 @@ mod tests {
         let algorithm = config.algorithm.name();
         let expected = format!("runs/3m-{algorithm}-seed1");
         assert_eq!(default_folder(&config), Path::new(&expected));
+    }
+
+    #[test]
+    fn a_run_ends_with_words() {
+        let score = |steps_env, mean, standard_error| Score {
+            steps_env,
+            mean,
+            standard_error,
+            episodes: 320,
+        };
+        let mut teams = Teams {
+            measure: "battle_won".to_owned(),
+            last: score(150_112, 0.978, 0.008),
+            best: Some(score(120_016, 0.984, 0.007)),
+        };
+        insta::assert_snapshot!(playing(&teams, &[0.0, 0.5, 0.9375, 1.0, 1.0, 0.96875]), @r"
+        The team won 97.8 % ± 0.8 of 320 battles that it had not seen.
+        Its last 5 tests won 50.0 to 100.0 %.
+        The best in a test were the weights of step 120016, which won 98.4 % ± 0.7 of 320 battles as well.
+        ");
+        teams.best = Some(teams.last);
+        insta::assert_snapshot!(playing(&teams, &[0.0]), @r"
+        The team won 97.8 % ± 0.8 of 320 battles that it had not seen.
+        No earlier weights did better in a test.
+        ");
     }
 }

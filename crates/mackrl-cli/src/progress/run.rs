@@ -2,7 +2,7 @@
 
 use mackrl::nn::InstructionSet;
 use mackrl_run::{
-    config::Config,
+    config::{Config, Origin},
     training_loop::{Observer, Standing},
 };
 
@@ -28,12 +28,23 @@ impl RunProgress {
         }
     }
 
-    /// Tells what learns and what it is computed with, before a run begins.
-    pub(crate) fn announce(&self, config: &Config, instructions: InstructionSet, threads: usize) {
+    /// Tells what learns and why, and what it is computed with, before a run begins.
+    pub(crate) fn announce(
+        &self,
+        config: &Config,
+        why: &Origin,
+        instructions: InstructionSet,
+        threads: usize,
+    ) {
         let s = if threads == 1 { "" } else { "s" };
         let (algorithm, world) = (config.algorithm.name(), printable(config.env.map()));
-        let text =
-            format!("{algorithm} on {world}, computing with {instructions} on {threads} thread{s}");
+        let why = match why {
+            Origin::Preset { name, .. } => format!("preset {name}"),
+            other => printable(&other.to_string()),
+        };
+        let text = format!(
+            "{algorithm} ({why}) on {world}, computing with {instructions} on {threads} thread{s}"
+        );
         self.lines.note(&text);
     }
 

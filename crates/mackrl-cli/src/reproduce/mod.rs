@@ -1,4 +1,4 @@
-//! One command for each figure of the paper.
+//! One command for each figure of the paper, and for the comparisons and teams of this project.
 //!
 //! Figures of learning are values of one type, which [`learning`] trains, draws and judges.
 
@@ -9,6 +9,9 @@ pub(crate) mod figure5;
 pub(crate) mod figure6;
 pub(crate) mod figure7;
 mod learning;
+mod page;
+pub(crate) mod ppo;
+pub(crate) mod zoo;
 
 use std::{fs, path::Path};
 

@@ -14,6 +14,8 @@ use mackrl_run::{
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
+use crate::words::did;
+
 /// Most bytes of metrics in one answer; the browser asks for the rest.
 const METRICS_MOST: u64 = 4 << 20;
 /// Newest replays that are listed: by their names, which end with the number of the episode.
@@ -186,7 +188,15 @@ fn status(run: &RecordedRun) -> String {
         Status::Interrupted => "interrupted",
         Status::Failed => "failed",
     };
-    status.to_owned()
+    let best = (run.teams.as_ref()).and_then(|teams| Some((teams, teams.best.as_ref()?)));
+    match best {
+        Some((teams, best)) => format!(
+            "{status}, best weights {} (step {})",
+            did(&teams.measure, best),
+            best.steps_env
+        ),
+        None => status.to_owned(),
+    }
 }
 
 fn settings(run: &RecordedRun) -> BTreeMap<String, String> {

@@ -119,6 +119,7 @@ impl Target for Scenario {
 /// The smallest team that can be trained.
 fn small() -> Config {
     let settings = [
+        "algorithm.name=mackrl",
         "algorithm.hidden=2",
         "algorithm.environments=1",
         "test.episodes=1",
@@ -232,7 +233,9 @@ impl Target for Checkpoints {
     }
 
     fn seeds(&self) -> Vec<Vec<u8>> {
-        let Checkpoint { tensors, counters } = Self::default().sound();
+        let Checkpoint {
+            tensors, counters, ..
+        } = Self::default().sound();
         vec![tensors, counters]
     }
 

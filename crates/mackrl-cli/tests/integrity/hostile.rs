@@ -66,13 +66,18 @@ fn no_command_is_led_astray_by_a_strangers_folder() {
     fs::write(&secret, format!("{{\"t_env\": \"{SECRET}\"}}\n{SECRET}\n")).expect("a secret");
     let plan = parent.path().join("plan.toml");
     let sweep = parent.path().join("sweep");
-    let text = format!("out = {:?}\nmaps = [\"3m\"]\nseeds = [3]\n", sweep);
+    let text = format!(
+        "out = {:?}\nmaps = [\"3m\"]\nalgorithms = [\"mackrl\"]\nseeds = [3]\n",
+        sweep
+    );
     fs::write(&plan, text).expect("a plan");
     let names = [
         "config.toml",
         "metrics.jsonl",
         "run.json",
         "weights.safetensors",
+        "weights",
+        "weights/best.safetensors",
         "lock",
         "checkpoints",
         "replays",

@@ -15,6 +15,7 @@ const SMALL: &[&str] = &[
     "run.seed=3",
     "run.metrics_interval_steps_env=200",
     "run.checkpoint_interval_steps_env=1",
+    "run.weights_interval_steps_env=400",
     "algorithm.name=mackrl",
     "algorithm.hidden=8",
     "algorithm.environments=1",
@@ -28,8 +29,12 @@ const SMALL: &[&str] = &[
 #[derive(PartialEq)]
 pub(crate) struct Outcome {
     weights: Vec<u8>,
-    /// Tensors and counters of the last checkpoint.
-    checkpoint: [Vec<u8>; 2],
+    /// Names and content of the weights that are kept beside the last.
+    kept: Vec<(PathBuf, Vec<u8>)>,
+    /// How the teams play, and hashes of what the run ended with, its metrics aside.
+    record: [serde_json::Value; 2],
+    /// Tensors, counters and best weights of the last checkpoint.
+    checkpoint: [Vec<u8>; 3],
     /// Rows without what depends on the clock.
     metrics: Vec<String>,
 }
@@ -120,9 +125,23 @@ pub(crate) fn outcome(run: &Path) -> Outcome {
         .expect("a run ends with a checkpoint");
     let metrics = String::from_utf8(read(run.join("metrics.jsonl"))).expect("metrics are UTF-8");
     assert!(metrics.ends_with('\n'), "metrics end on a whole line");
+    let mut kept: Vec<(PathBuf, Vec<u8>)> = fs::read_dir(run.join("weights"))
+        .expect("a run keeps weights")
+        .map(|entry| entry.expect("a name").path())
+        .map(|path| (path.file_name().expect("a name").into(), read(path)))
+        .collect();
+    kept.sort();
+    let record = read(run.join("run.json"));
+    let mut record: serde_json::Value = serde_json::from_slice(&record).expect("run.json is JSON");
+    // Metrics hold what depends on the clock.
+    let files = record["files"].as_object_mut().expect("hashes");
+    files.remove("metrics.jsonl");
     Outcome {
+        kept,
+        record: ["teams", "files"].map(|name| record[name].take()),
         weights: read(run.join("weights.safetensors")),
-        checkpoint: ["tensors.safetensors", "counters.json"].map(|name| read(last.join(name))),
+        checkpoint: ["tensors.safetensors", "counters.json", "best.safetensors"]
+            .map(|name| read(last.join(name))),
         metrics: metrics.lines().map(without_clock).collect(),
     }
 }

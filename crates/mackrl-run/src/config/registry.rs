@@ -27,6 +27,9 @@ struct Registered {
     like: Option<&'static str>,
 }
 
+/// The preset that we recommend: its algorithm is the built-in one.
+const RECOMMENDED: &str = "default";
+
 /// The kinds that this program offers, once it has started.
 static OFFERED: OnceLock<Registry> = OnceLock::new();
 
@@ -44,7 +47,8 @@ impl Default for Registry {
 }
 
 impl Registry {
-    /// Everything that is shipped; what is chosen where neither a preset nor a setting names something else comes first.
+    /// Everything that is shipped. Where nothing names another, the first world is chosen, and the algorithm of the preset
+    /// `default`.
     #[must_use]
     pub fn built_in() -> Self {
         let registry = Self {
@@ -137,17 +141,22 @@ impl Registry {
         EnvironmentConfig::new(first.unwrap_or_else(|| Arc::new(SkirmishKind)))
     }
 
-    /// The built-in algorithm.
+    /// The built-in algorithm: the one that brings the preset `default` along.
     pub(super) fn default_algorithm(&self) -> AlgorithmConfig {
-        let first = self.algorithms.first().map(Arc::clone);
-        AlgorithmConfig::new(first.unwrap_or_else(|| Arc::new(algorithms::Mackrl)))
+        let is_recommended = |kind: &&Arc<dyn AlgorithmKind>| {
+            let mut presets = kind.presets().iter();
+            presets.any(|preset| preset.name == RECOMMENDED)
+        };
+        let mut algorithms = self.algorithms.iter();
+        let recommended = algorithms.find(is_recommended).map(Arc::clone);
+        AlgorithmConfig::new(recommended.unwrap_or_else(|| Arc::new(algorithms::MackrlPpo)))
     }
 
     /// All shipped presets, `default` first, which is what we recommend.
     pub fn presets(&self) -> impl Iterator<Item = Preset> {
         let presets = self.algorithms.iter().flat_map(|kind| kind.presets());
         let mut presets: Vec<Preset> = presets.copied().collect();
-        presets.sort_by_key(|preset| preset.name != "default");
+        presets.sort_by_key(|preset| preset.name != RECOMMENDED);
         presets.into_iter()
     }
 
@@ -282,10 +291,9 @@ mod tests {
     }
 
     #[test]
-    fn the_default_preset_has_what_is_built_in_into_the_algorithm_that_it_names() {
-        let preset = ConfigBuilder::new(&Registry::built_in()).preset("default");
-        let expected = Config::with(&["algorithm.name=mackrl-ppo"]).unwrap();
-        assert_eq!(preset.unwrap().build().unwrap(), expected);
+    fn what_is_built_in_is_the_default_preset() {
+        let preset = ConfigBuilder::new(&Registry::built_in()).preset(RECOMMENDED);
+        assert_eq!(preset.unwrap().build().unwrap(), Config::default());
     }
 
     #[test]

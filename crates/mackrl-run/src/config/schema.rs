@@ -16,8 +16,14 @@ use crate::config::{Kind, Registry, RunConfig, TestConfig};
 pub fn schema(registry: &Registry) -> Value {
     let mut root = object();
     root["properties"] = json!({
-        "env": kinds(registry.worlds().map(|kind| &**kind)),
-        "algorithm": kinds(registry.algorithms().map(|kind| &**kind)),
+        "env": kinds(
+            registry.worlds().map(|kind| &**kind),
+            registry.default_environment().name(),
+        ),
+        "algorithm": kinds(
+            registry.algorithms().map(|kind| &**kind),
+            registry.default_algorithm().name(),
+        ),
         "test": section(TestConfig::SETTINGS, &table(&TestConfig::default())),
         "run": section(RunConfig::SETTINGS, &table(&RunConfig::default())),
     });
@@ -43,8 +49,8 @@ fn section(declared: &[Setting], built_in: &toml::Table) -> Value {
     section
 }
 
-/// The section in which one of these kinds is named.
-fn kinds<'a, K: Kind + ?Sized + 'a>(kinds: impl Iterator<Item = &'a K>) -> Value {
+/// The section in which one of these kinds is named, or else the one called `default`.
+fn kinds<'a, K: Kind + ?Sized + 'a>(kinds: impl Iterator<Item = &'a K>, default: &str) -> Value {
     let mut whole = object();
     let mut names = Vec::new();
     for kind in kinds {
@@ -62,7 +68,7 @@ fn kinds<'a, K: Kind + ?Sized + 'a>(kinds: impl Iterator<Item = &'a K>) -> Value
     let all: Vec<&String> = names.iter().map(|(name, _)| name).collect();
     whole["properties"]["name"] = json!({
         "enum": all,
-        "default": all.first(),
+        "default": default,
         "description": "What is chosen; which other settings there are depends on it.",
     });
     for (name, mut own) in names {

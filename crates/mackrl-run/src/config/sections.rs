@@ -61,6 +61,8 @@ declare_settings! {
         checkpoint_interval_steps_env: u64 = 200_000, Accepts::integer(1, EXACT);
         /// Checkpoints that stay in the run folder; older ones are removed. Changes no result.
         checkpoints_kept: usize = 2, Accepts::integer(1, 1000);
+        /// Environment steps between two weights that stay in the run folder, beside the last and the best; 0: none. Changes no result.
+        weights_interval_steps_env: u64 = 0, Accepts::integer(0, EXACT);
         /// Whether a TensorBoard event file is written beside metrics.jsonl, with the same names. Changes no result.
         tensorboard: bool = false, Accepts::Flag;
         /// Seed from which every random draw of the run is derived; known to all agents.

@@ -18,7 +18,7 @@ use crate::{
     error::{Context, Result},
     provenance::Provenance,
     run_folder::{self, Status},
-    training::headline,
+    training::{Teams, headline},
 };
 pub use curve::{Axis, Measurements, final_mean, share_of};
 pub use find::{find, locate, open};
@@ -46,6 +46,8 @@ pub struct RecordedRun {
     pub provenance: Vec<Provenance>,
     /// Whether rows of its metrics are missing, because they were found damaged when the run continued.
     pub misses_rows: bool,
+    /// How its last and its best weights play, if its folder says so.
+    pub teams: Option<Teams>,
 }
 
 impl RecordedRun {
@@ -63,6 +65,7 @@ impl RecordedRun {
             status: description.status,
             provenance: description.provenance,
             misses_rows: !description.metrics_put_aside.is_empty(),
+            teams: description.teams,
         })
     }
 
@@ -77,6 +80,7 @@ impl RecordedRun {
             status: Status::Finished,
             provenance: vec![run.provenance().clone()],
             misses_rows: false,
+            teams: None,
             kept: Some(run),
             path,
         })

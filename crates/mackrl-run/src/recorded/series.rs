@@ -11,12 +11,13 @@ use crate::{
 };
 
 /// Settings in which runs may differ and still be compared.
-const FREE: [&str; 6] = [
+const FREE: [&str; 7] = [
     "algorithm.name",
     "run.seed",
-    // These two change no result.
+    // These three change no result.
     "run.checkpoint_interval_steps_env",
     "run.checkpoints_kept",
+    "run.weights_interval_steps_env",
     // Maps are never compared with each other.
     "env.map",
     "env.name",
@@ -130,7 +131,7 @@ fn series(runs: Vec<RecordedRun>, selection: &Selection) -> Vec<Series> {
         let algorithm = run.algorithm();
         let key = (
             run.config.env.map().to_owned(),
-            usize::from(algorithm != "mackrl"),
+            usize::from(!algorithm.starts_with("mackrl")),
             name(&run, selection),
         );
         series.entry(key).or_default().push(run);
@@ -260,9 +261,10 @@ mod tests {
     use super::*;
 
     fn run(settings: &[&str]) -> RecordedRun {
-        let config = Config::with(settings).unwrap();
+        let config = Config::with(&[&["algorithm.name=mackrl"], settings].concat()).unwrap();
         RecordedRun {
             misses_rows: false,
+            teams: None,
             path: PathBuf::from(settings.join(" ")),
             provenance: vec![Provenance::of_run(&config)],
             config,

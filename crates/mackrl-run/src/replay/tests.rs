@@ -12,7 +12,8 @@ use crate::{
 };
 
 fn config(overrides: &[&str]) -> Config {
-    Config::with(&[&["run.steps_env=100"], overrides].concat()).unwrap()
+    let own = ["run.steps_env=100", "algorithm.name=mackrl"];
+    Config::with(&[&own[..], overrides].concat()).unwrap()
 }
 
 /// An episode of an untrained team that explores.

@@ -4,7 +4,9 @@
 //! checkpoints/000000000042/              after 42 updates and tests
 //!     tensors.safetensors                parameters, target critic, moments of the optimisers
 //!     counters.json                      counters, schedules, sums of the unfinished row of metrics
-//!     manifest.json                      length and hash of these, of config.toml, and of metrics.jsonl so far
+//!     best.safetensors                   the weights that did best in a test so far, as the run folder has them
+//!     manifest.json                      length and hash of these, of config.toml, of metrics.jsonl so far, and of other
+//!                                        weights that the run folder keeps
 //! ```
 //!
 //! A checkpoint is made under a temporary name, and loses its name before it is removed. So a folder without the ending `.tmp`
@@ -16,6 +18,7 @@ use std::path::{Path, PathBuf};
 use super::{
     CHECKPOINTS, CONFIG, METRICS,
     disk::{self, Disk},
+    kept::Kept,
     manifest::{FORMAT, Fingerprint, Growing, Manifest},
     stored::ConfigFile,
     untrusted,
@@ -29,6 +32,7 @@ use crate::{
 
 pub(super) const TENSORS: &str = "tensors.safetensors";
 pub(super) const COUNTERS: &str = "counters.json";
+const BEST: &str = "best.safetensors";
 pub(super) const MANIFEST: &str = "manifest.json";
 /// Greatest length of the counters: a few dozen numbers.
 const COUNTERS_MAX: usize = 1 << 20;
@@ -40,6 +44,8 @@ const DIGITS: usize = 12;
 pub(super) struct Surroundings {
     pub(super) config: Fingerprint,
     pub(super) metrics: Fingerprint,
+    /// Without the best weights.
+    pub(super) weights: Kept,
 }
 
 /// A checkpoint that was read and is as it was written.
@@ -49,6 +55,8 @@ pub(super) struct Stored {
     pub(super) checkpoint: Checkpoint,
     /// The metrics that belong to it; nothing, if they were damaged, lost or replaced.
     pub(super) metrics: Option<Growing>,
+    /// The weights that the run kept then, the best aside.
+    pub(super) weights: Kept,
 }
 
 /// Writes the checkpoint with this number, unless it is there, and removes all but the latest `kept` up to it.
@@ -64,7 +72,7 @@ pub(super) fn write(
 ) -> Result<()> {
     let place = place(number);
     if run.kind(&place)?.is_none() {
-        create_parent(disk, run)?;
+        disk::ensure_folder(disk, run, Path::new(CHECKPOINTS))?;
         make(disk, run, &place, &contents(checkpoint), surroundings)?;
     }
     let mut numbers = numbers(run)?;
@@ -75,23 +83,15 @@ pub(super) fn write(
     Ok(())
 }
 
-/// Makes the folder of the checkpoints, unless it is there.
-fn create_parent(disk: &dyn Disk, run: &Folder) -> Result<()> {
-    let parent = Path::new(CHECKPOINTS);
-    if run.kind(parent)?.is_some() {
-        return Ok(());
-    }
-    disk.create_folder(run, parent)
-        .with_context(|| run.cannot("create", parent))?;
-    disk::sync_folder(disk, run, Path::new(""))
-}
-
 /// The files of a checkpoint.
-fn contents(checkpoint: &Checkpoint) -> [(&'static str, &[u8]); 2] {
-    [
+fn contents(checkpoint: &Checkpoint) -> Vec<(&'static str, &[u8])> {
+    let best = checkpoint.best.iter();
+    let mut contents: Vec<(&str, &[u8])> = vec![
         (TENSORS, &checkpoint.tensors),
         (COUNTERS, &checkpoint.counters),
-    ]
+    ];
+    contents.extend(best.map(|best| (BEST, best.as_slice())));
+    contents
 }
 
 /// Makes a folder of these files and their manifest; what could not be completed is removed again, since a full disk needs the
@@ -101,13 +101,18 @@ fn make(
     run: &Folder,
     place: &Path,
     contents: &[(&str, &[u8])],
-    Surroundings { config, metrics }: Surroundings,
+    Surroundings {
+        config,
+        metrics,
+        weights,
+    }: Surroundings,
 ) -> Result<()> {
     let manifest = Manifest {
         format: FORMAT,
         code: CODE.to_owned(),
         config,
         metrics,
+        weights,
         files: contents
             .iter()
             .map(|(name, content)| ((*name).to_owned(), Fingerprint::of(content)))
@@ -209,6 +214,7 @@ fn read(run: &Folder, config: &ConfigFile, number: u64, tensors_max: usize) -> R
         number,
         checkpoint: read_files(run, &place, &manifest, tensors_max)?,
         metrics,
+        weights: manifest.weights,
     })
 }
 
@@ -228,11 +234,11 @@ fn read_manifest(folder: &Folder, place: &Path) -> Result<Manifest> {
         serde_json::from_slice(&manifest).map_err(|error| RunError::BadData {
             message: format!("{}: {error}", folder.cannot("understand", &place)),
         })?;
-    if manifest.format == FORMAT {
+    if (1..=FORMAT).contains(&manifest.format) {
         return Ok(manifest);
     }
     let message = format!(
-        "{} has format {}, expected {FORMAT}",
+        "{} has format {}, expected at most {FORMAT}",
         folder.shown(place).display(),
         manifest.format
     );
@@ -253,9 +259,11 @@ fn read_files(
             _ => Err(differs(folder, &path)),
         }
     };
+    let has_best = manifest.files.contains_key(BEST);
     Ok(Checkpoint {
         tensors: own(TENSORS, tensors_max)?,
         counters: own(COUNTERS, COUNTERS_MAX)?,
+        best: has_best.then(|| own(BEST, tensors_max)).transpose()?,
     })
 }
 

@@ -8,6 +8,7 @@ use std::{
 use super::{
     CONFIG, REPLAYS, checkpoints,
     disk::{self, RealDisk, cannot_write},
+    kept::{self, WhichWeights},
     record::Status,
     stored::StoredRun,
 };
@@ -16,11 +17,11 @@ use crate::{
     error::{Context, Result, RunError},
     folder::Folder,
     provenance::Provenance,
-    training::Checkpoint,
+    training::{Checkpoint, Teams},
 };
 
 /// What can be said of a run without its weights.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Description {
     /// How far it has come.
     pub status: Status,
@@ -28,6 +29,10 @@ pub struct Description {
     pub provenance: Vec<Provenance>,
     /// Metrics that were found damaged and put aside: what they held is missing.
     pub metrics_put_aside: Vec<String>,
+    /// Of a finished run, how its last and its best weights play; early versions do not say.
+    pub teams: Option<Teams>,
+    /// The weights that it keeps beside the last.
+    pub kept: Vec<WhichWeights>,
 }
 
 /// Whether a run lies in this folder.
@@ -42,9 +47,11 @@ pub fn is_run(path: &Path) -> bool {
 pub fn read_description(path: &Path) -> Result<(Config, Description)> {
     let run = StoredRun::open(path)?;
     let status = run.status();
-    let (mut provenance, metrics_put_aside) = run.record.map_or_else(Default::default, |record| {
-        (record.provenance, record.metrics_put_aside)
-    });
+    let kept = kept::listed(&run.folder)?;
+    let (mut provenance, metrics_put_aside, teams) =
+        run.record.map_or_else(Default::default, |record| {
+            (record.provenance, record.metrics_put_aside, record.teams)
+        });
     let config = run.config.config;
     if provenance.is_empty() {
         // Early versions did not say.
@@ -54,6 +61,8 @@ pub fn read_description(path: &Path) -> Result<(Config, Description)> {
         status,
         provenance,
         metrics_put_aside,
+        teams,
+        kept,
     };
     Ok((config, description))
 }
@@ -80,12 +89,7 @@ pub fn replace(path: &Path, content: &[u8]) -> Result<()> {
 pub fn keep_replay(run: &Path, name: &str, content: &[u8]) -> Result<PathBuf> {
     let folder = StoredRun::open(run)?.folder;
     let replays = Path::new(REPLAYS);
-    if folder.kind(replays)?.is_none() {
-        folder
-            .dir()
-            .create_dir(replays)
-            .with_context(|| folder.cannot("create", replays))?;
-    }
+    disk::ensure_folder(&RealDisk, &folder, replays)?;
     let path = replays.join(name);
     disk::replace(&RealDisk, &folder, &path, content)?;
     Ok(folder.shown(path))

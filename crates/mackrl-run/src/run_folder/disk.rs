@@ -122,6 +122,16 @@ pub(super) fn sync_folder(disk: &dyn Disk, within: &Folder, path: &Path) -> Resu
         .with_context(|| within.cannot("sync", path))
 }
 
+/// Makes a folder whose parent exists, unless it is there.
+pub(super) fn ensure_folder(disk: &dyn Disk, within: &Folder, path: &Path) -> Result<()> {
+    if within.kind(path)?.is_some() {
+        return Ok(());
+    }
+    disk.create_folder(within, path)
+        .with_context(|| within.cannot("create", path))?;
+    sync_folder(disk, within, parent(path))
+}
+
 /// The folder that a path lies in.
 pub(super) fn parent(path: &Path) -> &Path {
     path.parent().unwrap_or(Path::new(""))

@@ -120,8 +120,10 @@ fn third_checkpoint_on(
     }
     folder.disk = Box::new(disk.clone());
     folder.append_metrics("{\"t_env\":2}")?;
+    folder.write_weights(WhichWeights::Best, b"best")?;
+    folder.write_weights(WhichWeights::Step(2), b"kept")?;
     folder.write_checkpoint(3, &checkpoints[2])?;
-    folder.write_weights(b"weights")?;
+    folder.write_weights(WhichWeights::Last, b"weights")?;
     folder.set_status(Status::Finished)
 }
 
@@ -198,7 +200,9 @@ fn assert_continues(path: &Path, checkpoints: &[Checkpoint; 3]) {
     }
     folder.write_checkpoint(3, &checkpoints[2]).unwrap();
     assert_eq!(metrics(), after);
-    folder.write_weights(b"weights").unwrap();
+    folder
+        .write_weights(WhichWeights::Last, b"weights")
+        .unwrap();
     folder.set_status(Status::Finished).unwrap();
     drop(folder);
     let left: Vec<_> = fs::read_dir(path.join("checkpoints"))

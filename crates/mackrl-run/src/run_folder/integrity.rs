@@ -33,7 +33,9 @@ fn unfinished(path: &Path) -> (RunFolder, Checkpoint) {
 /// A run at its end.
 fn finished(path: &Path) {
     let (mut folder, checkpoint) = unfinished(path);
-    folder.write_weights(&checkpoint.tensors).unwrap();
+    folder
+        .write_weights(WhichWeights::Last, &checkpoint.tensors)
+        .unwrap();
     folder.set_status(Status::Finished).unwrap();
 }
 
@@ -75,7 +77,8 @@ fn a_run_whose_folder_was_replaced_writes_nothing_into_the_new_one() {
         let outcomes = [
             old.append_metrics("{\"t_env\":3}"),
             old.write_checkpoint(3, &checkpoint),
-            old.write_weights(b"weights"),
+            old.write_weights(WhichWeights::Last, b"weights"),
+            old.write_weights(WhichWeights::Best, b"weights"),
             old.write_events(3),
         ];
         for outcome in outcomes {
@@ -112,7 +115,10 @@ fn no_damage_to_metrics_costs_a_checkpoint() {
         drop(folder);
         damage(&path.join(METRICS));
         let left = fs::read(path.join(METRICS)).ok();
-        assert_eq!(Run::open(&path).unwrap().weights, checkpoint.tensors);
+        assert_eq!(
+            Run::open(&path, WhichWeights::Last).unwrap().weights,
+            checkpoint.tensors
+        );
         let resumption = RunFolder::resume(&path, 1).unwrap();
         assert!(resumption.checkpoint == Some(checkpoint), "case {case}");
         let aside = resumption.metrics_put_aside.expect("it is told");
@@ -149,7 +155,7 @@ fn a_configuration_that_says_the_same_in_other_bytes_is_the_same() {
 fn a_finished_run_is_refused_where_it_is_not_what_it_was() {
     let refused = |path: &Path, name: &str| {
         let errors = [
-            (WEIGHTS, Run::open(path).map(drop)),
+            (WEIGHTS, Run::open(path, WhichWeights::Last).map(drop)),
             (METRICS, Recorded::open(path).map(drop)),
             (METRICS, read_rows(path).map(drop)),
             (CONFIG, read_description(path).map(drop)),

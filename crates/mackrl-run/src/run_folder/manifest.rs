@@ -8,10 +8,13 @@ use std::{
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use super::kept::Kept;
 use crate::provenance::hexadecimal;
 
 /// Version of the manifest; it changes when an older program could not read it.
-pub(super) const FORMAT: u64 = 1;
+///
+/// 1: without kept weights, which are none then.
+pub(super) const FORMAT: u64 = 2;
 
 /// Length and hash of a file, or of the beginning of one that grows.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -91,6 +94,9 @@ pub(super) struct Manifest {
     pub(super) config: Fingerprint,
     /// The metrics so far; what stands behind them is cut off when the run continues.
     pub(super) metrics: Fingerprint,
+    /// The kept weights of the run, its best aside, which the checkpoint holds itself.
+    #[serde(default)]
+    pub(super) weights: Kept,
     /// The files beside the manifest.
     pub(super) files: BTreeMap<String, Fingerprint>,
 }

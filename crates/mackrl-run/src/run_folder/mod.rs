@@ -2,10 +2,12 @@
 //!
 //! ```text
 //! DIR/config.toml           everything that determines the result; written before the first step
-//! DIR/run.json              command line, provenance, status; of a finished run, hashes of what it ended with
+//! DIR/run.json              command line, provenance, status; of a finished run, how its last and its best weights play, and
+//!                           hashes of what it ended with
 //! DIR/metrics.jsonl         one JSON object a line
 //! DIR/checkpoints/          the latest few, from which the run continues
 //! DIR/weights.safetensors   the policy and the critic; written at the end
+//! DIR/weights/              those that did best in a test, and those of every so many steps, if `run.weights_interval_steps_env` is set
 //! DIR/events.out.tfevents.* the metrics for TensorBoard, if `run.tensorboard` is set; one file for each process that trained
 //! DIR/replays/              episodes that `mackrl evaluate --save-replays` kept
 //! DIR/lock                  held by the process that writes
@@ -24,8 +26,10 @@ mod checkpoints;
 mod description;
 mod disk;
 mod event_file;
+mod kept;
 mod latest;
 mod manifest;
+mod metrics_file;
 mod record;
 mod recorded;
 mod rows;
@@ -45,6 +49,8 @@ pub use description::{
 };
 use disk::{Disk, RealDisk, cannot_write};
 use event_file::EventFile;
+use kept::Kept;
+pub use kept::WhichWeights;
 pub use latest::{LatestRow, latest_row};
 use mackrl::nn::InstructionSet;
 use manifest::{Fingerprint, Growing};
@@ -60,7 +66,7 @@ use crate::{
     error::{Context, Result, RunError},
     folder::Folder,
     provenance::{Provenance, Versions},
-    training::{Checkpoint, assembly::tensors_bytes_max},
+    training::{Checkpoint, Teams, assembly::tensors_bytes_max},
 };
 
 const CONFIG: &str = "config.toml";
@@ -68,6 +74,8 @@ const CONFIG: &str = "config.toml";
 pub const METRICS: &str = "metrics.jsonl";
 const RUN: &str = "run.json";
 const WEIGHTS: &str = "weights.safetensors";
+/// Folder of the weights that are kept beside the last.
+const KEPT: &str = "weights";
 const LOCK: &str = "lock";
 const CHECKPOINTS: &str = "checkpoints";
 /// Name of the folder of recorded episodes in a run folder.
@@ -81,7 +89,7 @@ pub struct RunFolder {
     config: Fingerprint,
     metrics: File,
     metrics_so_far: Growing,
-    weights: Option<Fingerprint>,
+    kept: Kept,
     events: Option<EventFile>,
     checkpoints_kept: usize,
     record: RunRecord,
@@ -102,6 +110,8 @@ pub struct Resumption {
     pub damaged: Vec<String>,
     /// Where metrics were put that are not those of the checkpoint.
     pub metrics_put_aside: Option<PathBuf>,
+    /// Weights that were kept and are lost or damaged.
+    pub weights_lost: Vec<String>,
     /// The versions that made the run so far, if they are not those of this program.
     pub earlier: Option<Versions>,
 }
@@ -184,23 +194,35 @@ impl RunFolder {
         let (latest, damaged) = checkpoints::latest(&folder, &config, tensors_max)?;
         let number = latest.as_ref().map(|stored| stored.number);
         checkpoints::tidy(&RealDisk, &folder, number)?;
+        let known = latest.as_ref().map(|stored| &stored.weights);
+        let best = (latest.as_ref()).and_then(|stored| stored.checkpoint.best.as_deref());
+        let nothing = Kept::new();
+        let (kept, weights_lost) = kept::restore(
+            &RealDisk,
+            &folder,
+            known.unwrap_or(&nothing),
+            best,
+            tensors_max,
+        )?;
         let fingerprint = config.fingerprint();
         let config = config.config;
         let (metrics, checkpoint) = latest
             .map(|stored| (stored.metrics, stored.checkpoint))
             .unzip();
         let put_aside = match metrics {
-            Some(None) => Some(put_metrics_aside(&folder)?),
+            Some(None) => Some(metrics_file::put_aside(&folder)?),
             _ => None,
         };
         let metrics = metrics.flatten().unwrap_or_default();
         let mut opened = Self::open(folder, (&config, fingerprint), threads, lock, metrics)?;
+        opened.kept = kept;
         if let Some(name) = &put_aside {
             opened.record.metrics_put_aside.push(name.clone());
             opened.set_status(Status::Running)?;
         }
         Ok(Resumption {
             metrics_put_aside: put_aside.map(|name| opened.folder.shown(name)),
+            weights_lost,
             folder: opened,
             config,
             checkpoint,
@@ -217,7 +239,7 @@ impl RunFolder {
         lock: File,
         metrics_so_far: Growing,
     ) -> Result<Self> {
-        let metrics = open_metrics(&folder, metrics_so_far.bytes())?;
+        let metrics = metrics_file::open(&folder, metrics_so_far.bytes())?;
         let mut record = read_record(&folder).unwrap_or_else(|| RunRecord {
             command: std::env::args_os()
                 .map(|word| word.to_string_lossy().into_owned())
@@ -228,6 +250,7 @@ impl RunFolder {
             build: None,
             status: Status::Running,
             metrics_put_aside: Vec::new(),
+            teams: None,
             files: Default::default(),
         });
         record.threads = threads;
@@ -245,7 +268,7 @@ impl RunFolder {
             config: fingerprint,
             metrics,
             metrics_so_far,
-            weights: None,
+            kept: Kept::new(),
             events: None,
             checkpoints_kept: config.run.checkpoints_kept,
             record,
@@ -300,9 +323,12 @@ impl RunFolder {
         self.disk
             .sync(&self.metrics)
             .with_context(|| self.folder.cannot("sync", Path::new(METRICS)))?;
+        let mut weights = self.kept.clone();
+        weights.retain(|which, _| matches!(which, WhichWeights::Step(_)));
         let surroundings = Surroundings {
             config: self.config.clone(),
             metrics: self.metrics_so_far.fingerprint(),
+            weights,
         };
         checkpoints::write(
             &*self.disk,
@@ -313,14 +339,24 @@ impl RunFolder {
         )
     }
 
-    /// Puts the weights in place of earlier ones.
+    /// Puts these weights in place of earlier ones.
     ///
     /// # Errors
     /// Path, bytes and what the operating system says.
-    pub fn write_weights(&mut self, weights: &[u8]) -> Result<()> {
+    pub fn write_weights(&mut self, which: WhichWeights, weights: &[u8]) -> Result<()> {
         self.expect_own()?;
-        self.weights = Some(Fingerprint::of(weights));
-        self.replace(WEIGHTS, weights)
+        kept::write(&*self.disk, &self.folder, which, weights)?;
+        self.kept.insert(which, Fingerprint::of(weights));
+        Ok(())
+    }
+
+    /// Records that the run is finished, how its teams play, and length and hash of what it ended with.
+    ///
+    /// # Errors
+    /// As [`Self::set_status`].
+    pub fn finish(&mut self, teams: Teams) -> Result<()> {
+        self.record.teams = Some(teams);
+        self.set_status(Status::Finished)
     }
 
     /// Records how far the run has come; of a finished one, also length and hash of what it ended with.
@@ -332,15 +368,15 @@ impl RunFolder {
         self.record.status = status;
         self.record.files.clear();
         if status == Status::Finished {
-            let files = [
-                (CONFIG, Some(self.config.clone())),
-                (METRICS, Some(self.metrics_so_far.fingerprint())),
-                (WEIGHTS, self.weights.clone()),
+            let own = [
+                (CONFIG.to_owned(), self.config.clone()),
+                (METRICS.to_owned(), self.metrics_so_far.fingerprint()),
             ];
-            let present = files
-                .into_iter()
-                .filter_map(|(name, file)| Some((name.to_owned(), file?)));
-            self.record.files.extend(present);
+            let weights = self.kept.iter();
+            let weights = weights.map(|(which, file)| (which.name(), file.clone()));
+            self.record.files.extend(own.into_iter().chain(weights));
+        } else {
+            self.record.teams = None;
         }
         let json = serde_json::to_string_pretty(&self.record)
             .map_err(io::Error::from)
@@ -431,34 +467,6 @@ fn lock(folder: &Folder) -> Result<File> {
         }
         Err(TryLockError::Error(error)) => Err(error).with_context(|| folder.cannot("lock", path)),
     }
-}
-
-/// Opens the metrics for appending, and cuts off everything after the first `bytes` bytes.
-fn open_metrics(folder: &Folder, bytes: u64) -> Result<File> {
-    let path = Path::new(METRICS);
-    let mut options = OpenOptions::new();
-    options.create(true).append(true);
-    let file = folder
-        .open_with(path, &options)
-        .with_context(|| folder.cannot("open", path))?;
-    file.set_len(bytes)
-        .and_then(|()| file.sync_all())
-        .with_context(|| folder.cannot("cut", path))?;
-    Ok(file)
-}
-
-/// Gives metrics that are not those of the checkpoint another name, and says which; where there are none, nothing is moved.
-fn put_metrics_aside(folder: &Folder) -> Result<String> {
-    let mut name = format!("{METRICS}.damaged");
-    let mut number = 1;
-    while folder.kind(&name)?.is_some() {
-        number += 1;
-        name = format!("{METRICS}.damaged{number}");
-    }
-    if folder.kind(METRICS)?.is_some() {
-        disk::rename(&RealDisk, folder, Path::new(METRICS), Path::new(&name))?;
-    }
-    Ok(name)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::{RUN, manifest::Fingerprint, untrusted};
-use crate::{folder::Folder, provenance::Provenance};
+use crate::{folder::Folder, provenance::Provenance, training::Teams};
 
 /// How far a run has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -22,7 +22,7 @@ pub enum Status {
 }
 
 /// What `run.json` tells: where the result comes from, and facts that do not determine it.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct RunRecord {
     /// The command line, word by word.
     pub(super) command: Vec<String>,
@@ -42,6 +42,9 @@ pub(super) struct RunRecord {
     /// Files of metrics that were found damaged and put aside; what they held is missing in `metrics.jsonl`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) metrics_put_aside: Vec<String>,
+    /// Of a finished run, how its last and its best weights play.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) teams: Option<Teams>,
     /// Of a finished run, length and hash of its configuration, metrics and weights; runs of mackrl 0.1.0 do not say.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub(super) files: BTreeMap<String, Fingerprint>,

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::{
     CONFIG, METRICS, RUN, WEIGHTS, checkpoints,
+    kept::{self, WhichWeights},
     manifest::Fingerprint,
     record::{RunRecord, Status, read_record},
     untrusted,
@@ -16,7 +17,7 @@ use crate::{
     config::{Config, ConfigBuilder, registry},
     error::{Result, RunError},
     folder::Folder,
-    training::assembly::tensors_bytes_max,
+    training::{assembly::tensors_bytes_max, trained_steps_env},
 };
 
 /// A run folder that was opened to be read.
@@ -111,11 +112,17 @@ impl StoredRun {
     /// # Errors
     /// [`RunError::BadData`] if they are not those that the run ended with.
     pub(crate) fn weights(&self) -> Result<Option<Vec<u8>>> {
+        self.weights_of(WhichWeights::Last)
+    }
+
+    /// The file of these weights, if there is one.
+    fn weights_of(&self, which: WhichWeights) -> Result<Option<Vec<u8>>> {
         let length_max = tensors_bytes_max(&self.config.config)?;
-        let weights = self.folder.read(WEIGHTS, length_max)?;
-        match (&weights, self.seal(WEIGHTS)) {
+        let weights = self.folder.read(which.path(), length_max)?;
+        let name = which.name();
+        match (&weights, self.seal(&name)) {
             (Some(found), Some(seal)) if Fingerprint::of(found) != *seal => {
-                Err(self.differs(WEIGHTS))
+                Err(self.differs(&name))
             }
             _ => Ok(weights),
         }
@@ -132,11 +139,19 @@ impl StoredRun {
         if self.seal(METRICS).is_some() {
             self.rows(|_| ())?;
         }
-        Ok(match self.weights() {
-            Ok(Some(weights)) if !weights.is_empty() => Completeness::Finished,
-            Ok(_) | Err(RunError::BadData { .. }) => Completeness::WithoutWeights,
-            Err(error) => return Err(error),
-        })
+        let best = WhichWeights::Best;
+        let needed = [
+            Some(WhichWeights::Last),
+            self.seal(&best.name()).map(|_| best),
+        ];
+        for which in needed.into_iter().flatten() {
+            match self.weights_of(which) {
+                Ok(Some(weights)) if !weights.is_empty() => {}
+                Ok(_) | Err(RunError::BadData { .. }) => return Ok(Completeness::WithoutWeights),
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(Completeness::Finished)
     }
 
     /// What `run.json` says of a file of the run that ended, if it does.
@@ -190,13 +205,21 @@ pub struct Run {
 }
 
 impl Run {
-    /// Reads configuration and weights: those at the end of the run, or those of its latest checkpoint.
+    /// Reads configuration and weights. The last are those at the end of the run, or those of its latest checkpoint.
     ///
     /// # Errors
-    /// [`RunError::NotARun`] if there is no configuration; [`RunError::BadData`] if the weights are not those that the run ended with; otherwise
-    /// what is wrong with which file.
-    pub fn open(path: &Path) -> Result<Self> {
+    /// [`RunError::NotARun`] if there is no configuration; [`RunError::NoSuchWeights`] if it does not keep these weights;
+    /// [`RunError::BadData`] if they are not those that the run ended with; otherwise what is wrong with which file.
+    pub fn open(path: &Path, which: WhichWeights) -> Result<Self> {
         let run = StoredRun::open(path)?;
+        if which != WhichWeights::Last {
+            let weights = run.weights_of(which)?;
+            return Ok(Self {
+                weights: weights.ok_or_else(|| kept::missing(&run.folder, which))?,
+                weights_path: path.join(which.path()),
+                config: run.config.config,
+            });
+        }
         if let Some(weights) = run.weights()? {
             return Ok(Self {
                 weights,
@@ -217,6 +240,12 @@ impl Run {
             weights: stored.checkpoint.tensors,
             weights_path: path.join(checkpoints::weights_path(stored.number)),
         })
+    }
+
+    /// Environment steps of training that the weights had seen, if their file says so; those of checkpoints do not.
+    #[must_use]
+    pub fn steps_env(&self) -> Option<u64> {
+        trained_steps_env(&self.weights)
     }
 
     /// Reads the configuration of the run at `path`, and weights from another place.

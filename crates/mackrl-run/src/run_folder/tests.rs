@@ -12,9 +12,11 @@ fn a_run_is_read_as_it_was_written() {
     config.run.seed = 5;
     let mut folder = RunFolder::create(&path, &config, 2).unwrap();
     folder.append_metrics("{\"t_env\":3}").unwrap();
-    folder.write_weights(&[1, 2, 3]).unwrap();
+    folder
+        .write_weights(WhichWeights::Last, &[1, 2, 3])
+        .unwrap();
     folder.set_status(Status::Finished).unwrap();
-    let run = Run::open(&path).unwrap();
+    let run = Run::open(&path, WhichWeights::Last).unwrap();
     assert_eq!(run.config, config);
     assert_eq!(run.weights, [1, 2, 3]);
     assert_eq!(StoredRun::open(&path).unwrap().status(), Status::Finished);
@@ -57,11 +59,11 @@ fn a_file_in_the_place_of_the_folder_is_refused() {
 #[test]
 fn a_folder_without_a_run_or_with_half_of_one_is_named() {
     let parent = tempfile::tempdir().unwrap();
-    let error = Run::open(parent.path()).unwrap_err();
+    let error = Run::open(parent.path(), WhichWeights::Last).unwrap_err();
     assert!(error.to_string().contains("is not a run folder"), "{error}");
     let path = free_path(&parent);
     RunFolder::create(&path, &Config::default(), 1).unwrap();
-    let error = Run::open(&path).unwrap_err();
+    let error = Run::open(&path, WhichWeights::Last).unwrap_err();
     assert!(
         error.to_string().contains("the run has only begun"),
         "{error}"
@@ -74,7 +76,7 @@ fn a_damaged_configuration_is_named_with_file_and_line() {
     let path = free_path(&parent);
     RunFolder::create(&path, &Config::default(), 1).unwrap();
     fs::write(path.join(CONFIG), "[algorithm]\ngamma = 7\n").unwrap();
-    let error = Run::open(&path).unwrap_err();
+    let error = Run::open(&path, WhichWeights::Last).unwrap_err();
     assert!(
         error
             .to_string()
@@ -107,7 +109,7 @@ fn nothing_outside_a_strangers_run_folder_is_touched() {
         symlink(&mine, &link).unwrap();
         for error in [
             RunFolder::resume(&path, 1).unwrap_err(),
-            Run::open(&path).unwrap_err(),
+            Run::open(&path, WhichWeights::Last).unwrap_err(),
         ] {
             let message = error.to_string();
             assert!(

@@ -6,7 +6,7 @@
 
 use std::path::Path;
 
-use super::{CHECKPOINTS, CONFIG, LOCK, METRICS, REPLAYS, RUN, WEIGHTS};
+use super::{CHECKPOINTS, CONFIG, KEPT, LOCK, METRICS, REPLAYS, RUN, WEIGHTS};
 use crate::{
     error::Result,
     folder::{Folder, Kind},
@@ -26,7 +26,7 @@ pub(super) fn check(run: &Folder) -> Result<()> {
             CONFIG | METRICS | RUN | WEIGHTS | LOCK => {
                 run.expect(Path::new(&name), kind, Kind::File)?;
             }
-            CHECKPOINTS | REPLAYS => run.expect(Path::new(&name), kind, Kind::Folder)?,
+            CHECKPOINTS | KEPT | REPLAYS => run.expect(Path::new(&name), kind, Kind::Folder)?,
             _ => {}
         }
     }
@@ -35,6 +35,7 @@ pub(super) fn check(run: &Folder) -> Result<()> {
         run.expect(&checkpoint, kind, Kind::Folder)?;
         expect_files(run, &checkpoint)?;
     }
+    expect_files(run, Path::new(KEPT))?;
     expect_files(run, Path::new(REPLAYS))
 }
 

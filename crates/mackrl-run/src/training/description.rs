@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 
 use mackrl::policy::Policy;
+use safetensors::SafeTensors;
 use serde::Serialize;
 use serde_json::json;
 
@@ -17,6 +18,8 @@ use crate::{
 
 /// Version of the description; it changes when a reader of the former would be misled.
 const FORMAT: &str = "mackrl/3";
+/// Under which name the steps of training stand.
+const STEPS: &str = "trained_steps_env";
 
 /// The texts of a team that has trained for `steps_env` steps and ends with exploration ε.
 pub(super) fn description(
@@ -42,9 +45,16 @@ pub(super) fn description(
         ("spec", json(world.spec())),
         ("controllers", json(&policy.description())),
         ("partitions", json(&policy.partitions())),
-        ("trained_steps_env", steps_env.to_string()),
+        (STEPS, steps_env.to_string()),
         ("exploration", exploration.to_string()),
     ])
+}
+
+/// The environment steps of training that a file of weights says its team has seen, if it describes itself.
+#[must_use]
+pub fn trained_steps_env(file: &[u8]) -> Option<u64> {
+    let (_, header) = SafeTensors::read_metadata(file).ok()?;
+    header.metadata().as_ref()?.get(STEPS)?.parse().ok()
 }
 
 fn json(value: &impl Serialize) -> String {
@@ -77,7 +87,6 @@ pub(super) fn with_description(file: &[u8], texts: &BTreeMap<&'static str, Strin
 #[cfg(test)]
 mod tests {
     use mackrl::nn::ParameterLayout;
-    use safetensors::SafeTensors;
 
     use super::*;
     use crate::training::write_weights;
@@ -96,6 +105,12 @@ mod tests {
             assert!(texts.iter().all(|(name, text)| found[*name] == *text));
             let [before, after] = [&bare, &described].map(|f| SafeTensors::deserialize(f).unwrap());
             assert_eq!(before.tensors(), after.tensors());
+            assert_eq!(trained_steps_env(&bare), None);
+            let texts = BTreeMap::from([(STEPS, "123".to_owned())]);
+            assert_eq!(
+                trained_steps_env(&with_description(&bare, &texts)),
+                Some(123)
+            );
         }
     }
 }

@@ -10,13 +10,17 @@ mod comparison;
 mod description;
 mod evaluation;
 mod experience;
+mod interval;
 mod metrics;
+mod teams;
 mod trainer;
 mod weights;
 
 pub use checkpoint::Checkpoint;
 pub use comparison::{Difference, compare_tensors};
+pub use description::trained_steps_env;
 pub use evaluation::{Episodes, Evaluation, Quantity, evaluate, evaluate_in};
 pub use metrics::{METRICS, MetricRow, explained, headline, is_explained, of_statistics};
+pub use teams::{Score, Teams};
 pub use trainer::Trainer;
 pub use weights::{StoredWeights, read_weights, write_weights};

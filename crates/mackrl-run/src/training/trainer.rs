@@ -1,26 +1,25 @@
 //! The training loop: a batch of episodes, an update, now and then a test.
 
-use std::{
-    sync::{Arc, atomic::AtomicBool},
-    time::Instant,
-};
+use std::sync::{Arc, atomic::AtomicBool};
 
 use mackrl::{
     Error, Moment, Phase, Stopwatch,
     algorithms::Algorithm,
     experience::{Collector, Episode, Piece, PlaySettings},
     nn::ParameterLayout,
-    policy::{Recording, Tally},
+    policy::Recording,
 };
-use mackrl_env::{EpisodeKey, Statistic, Stream};
+use mackrl_env::{EnvironmentSpec, EpisodeKey, Stream};
 
 use super::{
-    Checkpoint, Evaluation, MetricRow, StoredWeights, assembly,
+    Checkpoint, Evaluation, MetricRow, Score, StoredWeights, Teams, assembly,
     checkpoint::Counters,
     description::{description, with_description},
     evaluation::Evaluator,
     experience::ExperienceHash,
+    interval::Interval,
     metrics::is_explained,
+    teams::{Best, episodes_of_judgement},
     write_weights,
 };
 use crate::config::Config;
@@ -39,17 +38,8 @@ pub struct Trainer {
     next_test: u64,
     next_row: u64,
     interval: Interval,
+    best: Option<Best>,
     stopwatch: Stopwatch,
-}
-
-/// What happened since the last row of metrics.
-struct Interval {
-    tally: Tally,
-    began: Instant,
-    /// Environment steps when the interval began; a row after a resumption still tells of the whole interval.
-    steps_env: u64,
-    /// Environment steps when the clock began: later than `steps_env` after a resumption.
-    steps_env_timed: u64,
 }
 
 impl Trainer {
@@ -96,6 +86,7 @@ impl Trainer {
             next_test: 0,
             next_row: config.run.metrics_interval_steps_env,
             interval: Interval::new(0),
+            best: None,
             stopwatch: Stopwatch::default(),
         })
     }
@@ -124,6 +115,12 @@ impl Trainer {
     pub fn stop_when(&mut self, stop: &Arc<AtomicBool>) {
         self.collector.stop_when(stop);
         self.evaluator.stop_when(stop);
+    }
+
+    /// Sizes of the world, and what its episodes are reported by.
+    #[must_use]
+    pub fn spec(&self) -> &EnvironmentSpec {
+        self.world.spec()
     }
 
     /// Environment steps so far, summed over the parallel environments.
@@ -173,6 +170,43 @@ impl Trainer {
             (self.steps_env, exploration),
         );
         with_description(&self.weights(), &texts)
+    }
+
+    /// The weights that did best in a test so far, as the file that a run leaves, and how they did: among equals the later ones.
+    #[must_use]
+    pub fn best(&self) -> Option<(&Score, &[u8])> {
+        let best = self.best.as_ref();
+        best.map(|best| (&best.test, best.weights.as_slice()))
+    }
+
+    /// How the weights play that the team has now, and how the best do, in greedy episodes that neither training nor tests have
+    /// seen: the first that [`evaluate`](super::evaluate) plays with the run's seed. It changes nothing of the run.
+    ///
+    /// # Errors
+    /// [`Error::Step`] if a world cannot be played in any more, [`Error::Stopped`] if asked to stop, [`Error::Data`] if the best
+    /// weights came from a damaged checkpoint.
+    pub fn judge(&mut self) -> Result<Teams, Error> {
+        let episodes = episodes_of_judgement(self.config.test.episodes);
+        let seed = self.config.run.seed;
+        let key = |episode| EpisodeKey::new(seed, Stream::Evaluation, episode);
+        let evaluator = &mut self.evaluator;
+        let evaluation = evaluator.play(self.algorithm.parameters(), episodes, key)?;
+        let last = Score::of(&evaluation, self.steps_env);
+        let best = match &self.best {
+            Some(best) if best.test.steps_env == self.steps_env => Some(last),
+            Some(best) => {
+                let team = assembly::trained(&self.config, &self.world, &best.weights)?;
+                let evaluation = evaluator.play(team.parameters(), episodes, key)?;
+                Some(Score::of(&evaluation, best.test.steps_env))
+            }
+            None => None,
+        };
+        let measure = evaluation.quantities.into_iter().next();
+        Ok(Teams {
+            measure: measure.map_or_else(String::new, |first| first.name),
+            last,
+            best,
+        })
     }
 
     /// The latest batch.
@@ -230,8 +264,9 @@ impl Trainer {
             next_row: self.next_row,
             interval_steps_env: self.interval.steps_env,
             interval: self.interval.tally.clone(),
+            best: self.best.as_ref().map(|best| best.test),
         };
-        Checkpoint::write(&self.algorithm.state(), &counters)
+        Checkpoint::write(&self.algorithm.state(), &counters, self.best.as_ref())
     }
 
     /// Continues where `checkpoint` was taken: what follows is the same to the byte as if there had been no interruption.
@@ -243,6 +278,7 @@ impl Trainer {
         let own = &*self.algorithm;
         let opened = checkpoint.open(|name| is_explained(name, own, statistics))?;
         self.algorithm.restore(&opened)?;
+        self.best = opened.best;
         let counters = opened.trainer;
         self.steps_env = counters.steps_env;
         self.episodes = counters.episodes;
@@ -340,6 +376,14 @@ impl Trainer {
             .map_err(|error| dated(error, moment))?;
         self.stopwatch.lap(Phase::Test);
         self.tests += 1;
+        let score = Score::of(&evaluation, self.steps_env);
+        if score.replaces(self.best.as_ref().map(|best| &best.test)) {
+            self.best = Some(Best {
+                test: score,
+                weights: self.described_weights(),
+            });
+        }
+        let test = &self.config.test;
         self.next_test = (self.steps_env / test.interval_steps_env + 1) * test.interval_steps_env;
         let mut row = self.row();
         append_test(&mut row, &evaluation);
@@ -386,26 +430,6 @@ fn dated(error: Error, moment: Moment) -> Error {
     match error {
         Error::NotFinite(broken) => broken.at(moment).into(),
         other => other,
-    }
-}
-
-impl Interval {
-    fn new(steps_env: u64) -> Self {
-        Self {
-            tally: Tally::default(),
-            began: Instant::now(),
-            steps_env,
-            steps_env_timed: steps_env,
-        }
-    }
-
-    fn note_episode(&mut self, episode: &Episode, statistics: &[Statistic]) {
-        let tally = &mut self.tally;
-        tally.add("return_mean", episode.total_reward(), 1.0);
-        tally.add("ep_length_mean", episode.steps() as f64, 1.0);
-        for (statistic, value) in statistics.iter().zip(&episode.statistics_s) {
-            tally.add(format!("{}_mean", statistic.name), *value, 1.0);
-        }
     }
 }
 

@@ -15,9 +15,11 @@ use crate::{
     config::Config,
     error::{Result, RunError},
     provenance::{Provenance, Versions},
-    run_folder::{Completeness, Resumption, RunFolder, Status, StoredRun, latest_row},
+    run_folder::{
+        Completeness, Resumption, RunFolder, Status, StoredRun, WhichWeights, latest_row,
+    },
     stop_request::StopRequest,
-    training::{Checkpoint, MetricRow, Trainer, assembly::RunWorld},
+    training::{Checkpoint, MetricRow, Score, Teams, Trainer, assembly::RunWorld, headline},
 };
 
 /// Most bytes of a checkpoint that is still written when a stop was asked for: a second or two.
@@ -66,9 +68,15 @@ pub struct Summary {
     pub steps_per_s: f64,
     /// Share of battles won in the last greedy test, in [0, 1], if the world counts them.
     pub battle_won_mean: Option<f64>,
+    /// What each test of this process gave, in order: the mean that says best how well a team plays in its world.
+    #[serde(skip)]
+    pub tests: Vec<f64>,
+    /// How the last weights and the best play in episodes that neither training nor tests have seen.
+    pub teams: Teams,
 }
 
-/// Makes the run that `config` describes, in `world`, and keeps metrics, checkpoints, status and weights in a new folder at `path`.
+/// Makes the run that `config` describes, in `world`, and keeps metrics, checkpoints, status and weights (the last, the best, and
+/// others if the configuration asks for them) in a new folder at `path`.
 ///
 /// # Errors
 /// [`RunError::Interrupted`] when asked to stop, after a checkpoint; [`RunError::FolderInUse`], [`RunError::UnfinishedRun`] or
@@ -126,6 +134,7 @@ pub fn resume(
         checkpoint,
         damaged,
         metrics_put_aside,
+        weights_lost,
         earlier,
     } = RunFolder::resume(path, threads)?;
     for damage in damaged {
@@ -135,6 +144,11 @@ pub fn resume(
         observer.warn(&format!(
             "the metrics are not those of the checkpoint: what is left of them is put aside as {}, and no rows before this point are known any more",
             aside.display()
+        ));
+    }
+    for weights in weights_lost {
+        observer.warn(&format!(
+            "{weights} is lost or damaged, and not kept any more"
         ));
     }
     if let Some(earlier) = earlier {
@@ -178,11 +192,11 @@ fn train_into<T: Training>(
 ) -> Result<Summary> {
     let outcome = continue_into(folder, training, config, stop, observer);
     observer.end();
-    let recorded = folder.set_status(match &outcome {
-        Ok(_) => Status::Finished,
-        Err(error) if error.is_interruption() => Status::Interrupted,
-        Err(_) => Status::Failed,
-    });
+    let recorded = match &outcome {
+        Ok(summary) => folder.finish(summary.teams.clone()),
+        Err(error) if error.is_interruption() => folder.set_status(Status::Interrupted),
+        Err(_) => folder.set_status(Status::Failed),
+    };
     // What stopped the training matters more than a status that cannot be written.
     let summary = outcome?;
     recorded?;
@@ -205,8 +219,13 @@ impl Snapshot {
 
     /// Writes it, unless that takes too long when a stop was asked for: then the run goes on from the checkpoint before.
     fn write_in_time(&self, folder: &mut RunFolder) -> Result<()> {
-        let Checkpoint { tensors, counters } = &self.checkpoint;
-        if tensors.len() + counters.len() > QUICKLY_WRITTEN {
+        let Checkpoint {
+            tensors,
+            counters,
+            best,
+        } = &self.checkpoint;
+        let best = best.as_ref().map_or(0, Vec::len);
+        if tensors.len() + counters.len() + best > QUICKLY_WRITTEN {
             return Ok(());
         }
         folder.write_checkpoint(self.iterations, &self.checkpoint)
@@ -230,6 +249,7 @@ fn continue_into<T: Training>(
     let interval = config.run.checkpoint_interval_steps_env;
     let mut intervals = steps_env_before / interval;
     let mut snapshot: Option<Snapshot> = None;
+    let mut tests = Vec::new();
     while !training.complete(|training| training.finished()) {
         if stop.is_made() {
             if let Ok(snapshot) = training.ask(stop, |training| Snapshot::of(training)) {
@@ -244,7 +264,7 @@ fn continue_into<T: Training>(
             }
             return Err(interrupted(folder.path(), standing.steps_env));
         };
-        let metrics = match update {
+        let (metrics, kept) = match update {
             // What was begun was given up; the checkpoint is that of the moment before.
             Err(mackrl::Error::Stopped) => continue,
             Err(mackrl::Error::NotFinite(number)) => {
@@ -256,11 +276,15 @@ fn continue_into<T: Training>(
             outcome => {
                 let update = outcome?;
                 standing = update.standing;
-                update.metrics
+                tests.extend(update.tested);
+                (update.metrics, update.kept)
             }
         };
         if let Some(metrics) = metrics {
             folder.append_metrics(&metrics)?;
+        }
+        for (which, weights) in kept {
+            folder.write_weights(which, &weights)?;
         }
         observer.progress(&standing);
         if standing.steps_env / interval > intervals {
@@ -281,7 +305,13 @@ fn continue_into<T: Training>(
     let (last, weights) =
         training.complete(|training| (Snapshot::of(training), training.weights()));
     folder.write_checkpoint(last.iterations, &last.checkpoint)?;
-    folder.write_weights(&weights)?;
+    folder.write_weights(WhichWeights::Last, &weights)?;
+    let teams = match training.ask(stop, |training| training.judge()) {
+        Ok(Err(mackrl::Error::Stopped)) | Err(_) => {
+            return Err(interrupted(folder.path(), standing.steps_env));
+        }
+        Ok(teams) => teams?,
+    };
     let wall_s = start.elapsed().as_secs_f64();
     let steps_env = standing.steps_env;
     Ok(Summary {
@@ -290,6 +320,8 @@ fn continue_into<T: Training>(
         wall_s,
         steps_per_s: (steps_env - steps_env_before) as f64 / wall_s.max(1e-9),
         battle_won_mean: standing.battle_won_mean,
+        tests,
+        teams,
     })
 }
 
@@ -300,6 +332,10 @@ struct Update {
     metrics: Option<String>,
     /// How the run stands.
     standing: Standing,
+    /// What a test gave, if it was one.
+    tested: Option<f64>,
+    /// Weights that are to be kept.
+    kept: Vec<(WhichWeights, Vec<u8>)>,
 }
 
 /// Something that learns from one batch of episodes after the other.
@@ -316,6 +352,8 @@ trait Training: Send + 'static {
     fn checkpoint(&self) -> Checkpoint;
     /// The weights as safetensors, with what they are.
     fn weights(&self) -> Vec<u8>;
+    /// How the last weights and the best play.
+    fn judge(&mut self) -> Result<Teams, mackrl::Error>;
 }
 
 /// A trainer, and what it last reported.
@@ -323,12 +361,17 @@ struct Reporting {
     trainer: Trainer,
     standing: Standing,
     provenance: String,
+    /// Environment steps between two weights that are kept, or 0.
+    weights_interval: u64,
+    /// The metric that says best how well the team plays.
+    headline: String,
 }
 
 impl Reporting {
     /// A trainer of the run that `config` describes, at its beginning or restored, that gives up when asked to stop.
     fn new(mut trainer: Trainer, config: &Config, stop: &StopRequest) -> Self {
         trainer.stop_when(stop.flag());
+        let headline = headline(trainer.spec());
         let standing = Standing {
             steps_env: trainer.steps_env(),
             steps_env_total: config.run.steps_env,
@@ -338,12 +381,37 @@ impl Reporting {
             trainer,
             standing,
             provenance: Provenance::of_run(config).id,
+            weights_interval: config.run.weights_interval_steps_env,
+            headline,
         }
+    }
+
+    /// The weights that are to be kept after an update or a test that began with so many environment steps.
+    fn kept(
+        &self,
+        steps_env_before: u64,
+        best_before: Option<Score>,
+    ) -> Vec<(WhichWeights, Vec<u8>)> {
+        let mut kept = Vec::new();
+        if let Some((score, weights)) = self.trainer.best()
+            && best_before != Some(*score)
+        {
+            kept.push((WhichWeights::Best, weights.to_owned()));
+        }
+        let reached = |steps_env: u64| steps_env.checked_div(self.weights_interval).unwrap_or(0);
+        let now = reached(self.trainer.steps_env());
+        if now > reached(steps_env_before) {
+            let which = WhichWeights::Step(now * self.weights_interval);
+            kept.push((which, self.trainer.described_weights()));
+        }
+        kept
     }
 }
 
 impl Training for Reporting {
     fn update(&mut self) -> Result<Update, mackrl::Error> {
+        let steps_env_before = self.trainer.steps_env();
+        let best_before = self.trainer.best().map(|(score, _)| *score);
         let row = self.trainer.update()?;
         self.standing.steps_env = self.trainer.steps_env();
         if let Some(row) = &row {
@@ -356,6 +424,7 @@ impl Training for Reporting {
             self.standing.battle_won_mean = latest("test_battle_won_mean", battle_won_mean);
             self.standing.delegation_rate = latest("mackrl/delegation_rate", delegation_rate);
         }
+        let tested = row.as_ref().and_then(|row| row.get(&self.headline));
         let metrics = row.map(|metrics| Row {
             metrics,
             provenance: &self.provenance,
@@ -364,6 +433,8 @@ impl Training for Reporting {
         Ok(Update {
             metrics: metrics.map(json),
             standing: self.standing,
+            tested,
+            kept: self.kept(steps_env_before, best_before),
         })
     }
 
@@ -385,6 +456,10 @@ impl Training for Reporting {
 
     fn weights(&self) -> Vec<u8> {
         self.trainer.described_weights()
+    }
+
+    fn judge(&mut self) -> Result<Teams, mackrl::Error> {
+        self.trainer.judge()
     }
 }
 

@@ -350,11 +350,7 @@ impl History {
         found: &mut Computed,
         is_drawn: impl Fn(&ControllerId) -> bool,
     ) {
-        let own = |computed: &Computed| -> Vec<ControllerId> {
-            let inputs = computed.inputs.iter();
-            inputs.map(|(controller, _)| controller.clone()).collect()
-        };
-        let ran = [own(expected), own(found)];
+        let ran = [controllers(&expected.inputs), controllers(&found.inputs)];
         let both = |controller: &ControllerId| ran.iter().all(|own| own.contains(controller));
         let before =
             |controller: &ControllerId| self.ran.iter().any(|own| own.contains(controller));
@@ -364,18 +360,19 @@ impl History {
             (computed.inputs).retain(|(own, _)| both(own) || !is_drawn(own));
             computed.outputs.retain(|(own, _)| alike.contains(own));
         }
-        let asked = own_outputs(found);
+        let asked = controllers(&found.outputs);
         expected.outputs.retain(|(own, _)| asked.contains(own));
-        let asked = own_outputs(expected);
+        let asked = controllers(&expected.outputs);
         found.outputs.retain(|(own, _)| asked.contains(own));
         self.ran = ran;
         self.alike = alike;
     }
 }
 
-fn own_outputs(computed: &Computed) -> Vec<ControllerId> {
-    let outputs = computed.outputs.iter();
-    outputs.map(|(controller, _)| controller.clone()).collect()
+/// Whose numbers these are.
+fn controllers<T>(numbers: &[(ControllerId, T)]) -> Vec<ControllerId> {
+    let own = numbers.iter();
+    own.map(|(controller, _)| controller.clone()).collect()
 }
 
 impl Recorded {

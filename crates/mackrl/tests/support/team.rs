@@ -17,9 +17,10 @@ const SEED: u64 = 3;
 pub(crate) const MACKRL: &str = "algorithm.name=mackrl";
 pub(crate) const CENTRAL_V: &str = "algorithm.name=central-v";
 
-/// The configuration with these settings over the built-in ones.
+/// The configuration with these settings over the built-in ones of the paper's algorithm.
 pub(crate) fn config(settings: &[&str]) -> Config {
-    Config::with(settings).expect("known settings within their ranges")
+    let settings = [&["algorithm.name=mackrl"], settings].concat();
+    Config::with(&settings).expect("known settings within their ranges")
 }
 
 /// The setting that chooses a map, or a world that has none.

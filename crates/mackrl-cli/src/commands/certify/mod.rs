@@ -50,7 +50,7 @@ struct Stated<'a> {
 
 /// Compares a trained team's central run with its agents in processes of their own, and fails if anything differs.
 pub(crate) fn run(args: &CertifyArgs) -> anyhow::Result<()> {
-    let run = Run::open(&args.run)?;
+    let run = Run::open(&args.run, args.weights.checkpoint)?;
     let certificate =
         certify(&run, args).with_context(|| format!("cannot certify {}", args.run.display()))?;
     let judgement = Judgement {

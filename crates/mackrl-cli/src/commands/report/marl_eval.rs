@@ -2,8 +2,8 @@
 //! Cooperative MARL", 2022): environment, task, algorithm, run, step.
 //!
 //! marl-eval wants rectangular data, so every run is cut to the tests, and every algorithm to the number of runs, that all have. A
-//! test's number is its mean over episodes, a list of one. `absolute_metrics` are those of the last test: weights of earlier
-//! tests are not kept, so no best policy can be played again.
+//! test's number is its mean over episodes, a list of one. `absolute_metrics` are what the best weights won in episodes that neither
+//! training nor tests have seen, if the run says so; what it does not say is that of the last test.
 
 use std::collections::BTreeMap;
 
@@ -29,6 +29,8 @@ struct Tests {
     /// Environment steps between two tests.
     interval: u64,
     columns: Vec<Measurements>,
+    /// Share of battles that the best weights won in the end.
+    absolute_won: Option<f64>,
 }
 
 /// All runs as one document.
@@ -72,6 +74,13 @@ pub(super) fn experiments(grouping: &Grouping) -> anyhow::Result<Value> {
     Ok(json!({ ENVIRONMENT: tasks }))
 }
 
+/// The absolute metric of a run that recorded it.
+fn absolute_won(run: &RecordedRun) -> Option<f64> {
+    let teams = run.teams.as_ref()?;
+    let best = teams.best.filter(|_| teams.measure == "battle_won")?;
+    Some(best.mean)
+}
+
 impl Tests {
     fn read(run: &RecordedRun) -> anyhow::Result<Self> {
         let columns = METRICS
@@ -83,6 +92,7 @@ impl Tests {
             seed: run.config.run.seed,
             interval: run.config.test.interval_steps_env,
             columns,
+            absolute_won: absolute_won(run),
         })
     }
 
@@ -120,6 +130,9 @@ impl Tests {
         let mut steps: serde_json::Map<String, Value> = (0..length).map(step).collect();
         if let Some(last) = length.checked_sub(1) {
             let mut absolute: serde_json::Map<String, Value> = metrics(last).collect();
+            if let (Some(won), [(_, theirs), ..]) = (self.absolute_won, METRICS) {
+                absolute.insert(theirs.to_owned(), json!([won]));
+            }
             // marl-eval takes it for a metric, and wants the same metrics everywhere.
             absolute.insert("elapsed_time".to_owned(), self.seconds(last));
             steps.insert("absolute_metrics".to_owned(), Value::Object(absolute));

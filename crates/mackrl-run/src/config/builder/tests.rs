@@ -106,8 +106,10 @@ fn a_value_out_of_range_is_named_with_its_place() {
         "run.toml:1:27: `algorithm.learning_rate` is nan, expected a number in (0, 1]"
     );
     assert_eq!(
-        message(file("algorithm.exploration_finish = 0.9")),
-        "run.toml:1:32: `algorithm.exploration_finish` is 0.9, expected at most 0.5, which is algorithm.exploration_start"
+        message(file(
+            "algorithm.name = \"mackrl\"\nalgorithm.exploration_finish = 0.9"
+        )),
+        "run.toml:2:32: `algorithm.exploration_finish` is 0.9, expected at most 0.5, which is algorithm.exploration_start"
     );
 }
 
@@ -320,8 +322,8 @@ fn a_setting_of_the_map_that_is_wrong_is_named_like_any_other() {
 
 #[test]
 fn a_team_without_the_partitions_that_are_asked_for_is_named_with_its_place() {
-    let large =
-        file("[env]\nmap = \"27m_vs_30m\"\n[algorithm.mackrl]\npartitions = \"all\"\n").unwrap();
+    let large = file("[env]\nmap = \"27m_vs_30m\"\n[algorithm.mackrl-ppo]\npartitions = \"all\"\n")
+        .unwrap();
     assert_eq!(
         message(Ok(large.clone())),
         "run.toml:4:14: `algorithm.partitions` is \"all\", expected `round-robin` or `sampled:K` for the 27 agents of 27m_vs_30m"
@@ -357,7 +359,7 @@ prop_compose! {
         map in prop::sample::select(mackrl_skirmish::map_names()),
         move_amount in 0.1f64..=32.0,
     ) -> Config {
-        let mut config = Config::default();
+        let mut config = Config::with(&["algorithm.name=mackrl"]).unwrap();
         if central_v {
             config.algorithm = AlgorithmConfig::new(Arc::new(CentralV));
         } else {

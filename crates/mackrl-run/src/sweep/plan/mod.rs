@@ -1,9 +1,9 @@
 //! The plan of a sweep: a TOML file that says which runs there are.
 //!
-//! A plan names maps, algorithms and seeds, and every combination of them is a run. `[settings]` holds for all runs; each list in
-//! `[vary]` multiplies them; each table in `[variants]` is a kind of run with settings of its own. Files may come from anybody:
-//! length and number of runs are bounded, names of runs cannot lead out of the sweep's folder, and nothing is run but this
-//! program. The sweep's folder itself, `out`, may be any path: read it, or give `--out`, before making a stranger's plan.
+//! A plan names maps, algorithms and seeds, and every combination of them is a run. `[settings]` holds for all runs, `[on.MAP]` for
+//! those on one map, which may have seeds of its own; each list in `[vary]` multiplies the runs; each table in `[variants]` is a
+//! kind of run with settings of its own. Files may come from anybody: length and number of runs are bounded, names of runs cannot
+//! lead out of the sweep's folder, and nothing is run but this program. The sweep's folder itself, `out`, may be any path: read it, or give `--out`, before making a stranger's plan.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -43,15 +43,37 @@ struct Document {
     #[serde(default = "default_preset")]
     preset: String,
     maps: Vec<String>,
-    #[serde(default = "default_algorithms")]
-    algorithms: Vec<String>,
+    algorithms: Option<Vec<String>>,
     seeds: Seeds,
+    #[serde(default)]
+    order: Order,
     #[serde(default, rename = "settings")]
     _settings: BTreeMap<String, IgnoredAny>,
     #[serde(default, rename = "vary")]
     _vary: BTreeMap<String, IgnoredAny>,
     #[serde(default)]
     variants: BTreeMap<String, BTreeMap<String, IgnoredAny>>,
+    #[serde(default)]
+    on: BTreeMap<String, OnMap>,
+}
+
+/// What holds on one map.
+#[derive(Debug, Deserialize)]
+struct OnMap {
+    seeds: Option<Seeds>,
+    #[serde(flatten)]
+    _settings: BTreeMap<String, IgnoredAny>,
+}
+
+/// What comes first among the runs.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Order {
+    /// All runs on the first map.
+    #[default]
+    ByMap,
+    /// The first seed of everything, so that whatever is made can be compared at every moment.
+    BySeed,
 }
 
 /// So many seeds from 1, or these.
@@ -67,7 +89,8 @@ enum Seeds {
 pub struct Plan {
     /// Folder of the run folders.
     pub out: PathBuf,
-    /// All runs: maps, then algorithms, then variants and varied settings, then seeds, the last innermost.
+    /// All runs: maps, then algorithms, then variants and varied settings, then seeds, the last innermost; or, if the plan says so,
+    /// the first seed of all of them, then the second.
     pub entries: Vec<Entry>,
 }
 
@@ -96,10 +119,6 @@ struct Reading<'a> {
 
 fn default_preset() -> String {
     "default".to_owned()
-}
-
-fn default_algorithms() -> Vec<String> {
-    vec!["mackrl".to_owned()]
 }
 
 impl Plan {
@@ -149,27 +168,50 @@ impl Plan {
 
 impl Reading<'_> {
     fn entries(&self, out: &Path) -> Result<Vec<Entry>> {
-        let Document {
-            maps, algorithms, ..
-        } = &self.document;
-        let (seeds, kinds, base) = (self.seeds()?, self.kinds()?, self.base()?);
-        let count = (maps.len() * algorithms.len())
-            .saturating_mul(kinds.len())
-            .saturating_mul(seeds.len());
+        let maps = &self.document.maps;
+        if let Some(map) = self.document.on.keys().find(|map| !maps.contains(map)) {
+            let message = format!("`on.{map}` is about a map that `maps` does not list");
+            return Err(self.error("on", message));
+        }
+        let (kinds, base) = (self.kinds()?, self.base()?);
+        // Without a list, the preset decides.
+        let algorithms: Vec<Option<&str>> = match &self.document.algorithms {
+            Some(listed) => listed.iter().map(|name| Some(&**name)).collect(),
+            None => vec![None],
+        };
+        let seeds = maps.iter().map(|map| self.seeds_on(map));
+        let seeds = seeds.collect::<Result<Vec<_>>>()?;
+        let of_a_seed = algorithms.len().saturating_mul(kinds.len());
+        let count = (seeds.iter().map(Vec::len))
+            .fold(0, usize::saturating_add)
+            .saturating_mul(of_a_seed);
         if !(1..=RUNS_MAX).contains(&count) {
             let message = format!("the plan has {count} runs, expected 1 to {RUNS_MAX}");
             return Err(self.error("maps", message));
         }
-        let mut entries = Vec::with_capacity(count);
-        for map in maps {
-            for algorithm in algorithms {
-                let builder = base.clone().map_at(self.origin_of("maps"), map);
-                let builder = self.assign(builder, "algorithms", "algorithm.name", algorithm)?;
+        // Each with the place of its seed among those of its kind.
+        let mut placed: Vec<(usize, Entry)> = Vec::with_capacity(count);
+        for (map, seeds) in maps.iter().zip(&seeds) {
+            let on_map = base.clone().map_at(self.origin_of("maps"), map);
+            let on_map = lay(on_map, &self.settings_in(&["on", map]))?;
+            refuse(&on_map, &LISTED[1..])?;
+            for algorithm in &algorithms {
+                let builder = match algorithm {
+                    Some(name) => {
+                        self.assign(on_map.clone(), "algorithms", "algorithm.name", name)?
+                    }
+                    None => on_map.clone(),
+                };
                 for kind in &kinds {
-                    entries.extend(self.repetitions(builder.clone(), kind, &seeds, out)?);
+                    let entries = self.repetitions(builder.clone(), kind, seeds, out)?;
+                    placed.extend(entries.into_iter().enumerate());
                 }
             }
         }
+        if self.document.order == Order::BySeed {
+            placed.sort_by_key(|(place, _)| *place);
+        }
+        let entries: Vec<Entry> = placed.into_iter().map(|(_, entry)| entry).collect();
         let mut names = BTreeSet::new();
         match entries.iter().find(|entry| !names.insert(&entry.name)) {
             None => Ok(entries),
@@ -220,8 +262,11 @@ impl Reading<'_> {
         Ok(builder)
     }
 
-    fn seeds(&self) -> Result<Vec<u64>> {
-        match self.document.seeds.clone() {
+    /// The seeds of the runs on a map.
+    fn seeds_on(&self, map: &str) -> Result<Vec<u64>> {
+        let own = self.document.on.get(map).and_then(|on| on.seeds.clone());
+        let key = if own.is_some() { "on" } else { "seeds" };
+        match own.unwrap_or_else(|| self.document.seeds.clone()) {
             Seeds::Count(count) if (1..=RUNS_MAX as u64).contains(&count) => {
                 Ok((1..=count).collect())
             }
@@ -229,7 +274,7 @@ impl Reading<'_> {
             _ => {
                 let message =
                     format!("`seeds` is not a number in 1 to {RUNS_MAX} or a list with a seed");
-                Err(self.error("seeds", message))
+                Err(self.error(key, message))
             }
         }
     }
@@ -268,7 +313,8 @@ impl Reading<'_> {
                 origin: origin(self.name, self.text, leaf.value_at),
             })
         });
-        leaves.collect()
+        // The seeds of a map are no setting.
+        leaves.filter(|setting| setting.key != "seeds").collect()
     }
 
     fn assign(

@@ -47,8 +47,8 @@ fn lists_multiply_and_variants_have_settings_of_their_own() {
     let expected = [
         "3m-central-v-alone-gamma-0.5-seed5",
         "3m-central-v-alone-gamma-1.0-seed5",
-        "3m-mackrl-full-gamma-0.5-seed5",
-        "3m-mackrl-full-gamma-1.0-seed5",
+        "3m-mackrl-ppo-full-gamma-0.5-seed5",
+        "3m-mackrl-ppo-full-gamma-1.0-seed5",
     ];
     assert_eq!(names(text), expected);
     assert_eq!(
@@ -56,6 +56,43 @@ fn lists_multiply_and_variants_have_settings_of_their_own() {
             .config
             .get("algorithm.gamma"),
         Some(0.5.into())
+    );
+}
+
+#[test]
+fn without_a_list_the_preset_names_the_algorithm() {
+    for (preset, algorithm) in [("default", "mackrl-ppo"), ("paper", "mackrl")] {
+        let text = format!("preset = \"{preset}\"\nmaps = [\"3m\"]\nseeds = 1\n");
+        assert_eq!(names(&text), [format!("3m-{algorithm}-seed1")]);
+    }
+}
+
+#[test]
+fn a_map_has_settings_and_seeds_of_its_own() {
+    let text = "maps = [\"3m\", \"2s3z\", \"8m\"]\nalgorithms = [\"mappo\", \"ippo\"]\nseeds = 3\n\
+                order = \"by-seed\"\n[settings]\nrun.steps_env = 10\n\
+                [on.2s3z]\nseeds = [7]\nrun.steps_env = 20\n[on.8m]\nseeds = 2\n";
+    let expected = [
+        "3m-mappo-seed1",
+        "3m-ippo-seed1",
+        "2s3z-mappo-seed7",
+        "2s3z-ippo-seed7",
+        "8m-mappo-seed1",
+        "8m-ippo-seed1",
+        "3m-mappo-seed2",
+        "3m-ippo-seed2",
+        "8m-mappo-seed2",
+        "8m-ippo-seed2",
+        "3m-mappo-seed3",
+        "3m-ippo-seed3",
+    ];
+    assert_eq!(names(text), expected);
+    let steps = |entry: usize| parse(text).unwrap().entries[entry].config.run.steps_env;
+    assert_eq!([steps(0), steps(2), steps(4)], [10, 20, 10]);
+    let by_map = names(&text.replace("by-seed", "by-map"));
+    assert_eq!(
+        by_map[..3],
+        ["3m-mappo-seed1", "3m-mappo-seed2", "3m-mappo-seed3"]
     );
 }
 
@@ -104,7 +141,27 @@ fn errors_name_line_and_column() {
         ),
         (
             "maps = [\"3m\"]\nseeds = [1, 1]\n",
-            "plan.toml:1:8: two runs would be called 3m-mackrl-seed1",
+            "plan.toml:1:8: two runs would be called 3m-mackrl-ppo-seed1",
+        ),
+        (
+            "maps = [\"3m\"]\nseeds = 1\n[on.8m]\nrun.steps_env = 7\n",
+            "plan.toml:4:17: `on.8m` is about a map that `maps` does not list",
+        ),
+        (
+            "maps = [\"3m\"]\nseeds = 1\n[on.3m]\nseeds = 0\n",
+            "plan.toml:4:9: `seeds` is not a number",
+        ),
+        (
+            "maps = [\"3m\"]\nseeds = 1\n[on.3m]\nrun.stesp_env = 7\n",
+            "plan.toml:4:17: unknown key `run.stesp_env`",
+        ),
+        (
+            "maps = [\"3m\"]\nseeds = 1\n[on.3m]\nrun.seed = 7\n",
+            "plan.toml:4:12: `run.seed` is given by `seeds`",
+        ),
+        (
+            "maps = [\"3m\"]\nseeds = 1\norder = \"by-chance\"\n",
+            "plan.toml:3:9: unknown variant `by-chance`",
         ),
         (
             "maps = [\"3m\"]\nseeds = 1\n[variants.\"../x\"]\nalgorithm.gamma = 0.5\n",
@@ -139,11 +196,19 @@ fn values_that_folders_cannot_be_called_after_are_made_plain() {
 }
 
 #[test]
-fn the_shipped_plan_is_a_plan() {
-    let file = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../examples/sweeps/figure6.toml"
-    );
-    let plan = parse(&std::fs::read_to_string(file).unwrap()).unwrap();
-    assert_eq!(plan.entries.len(), 40);
+fn the_shipped_plans_are_plans() {
+    let shipped = |file: &str| {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        parse(&std::fs::read_to_string(root.join(file)).unwrap()).unwrap()
+    };
+    let figure6 = shipped("examples/sweeps/figure6.toml");
+    assert_eq!(figure6.entries.len(), 40);
+    let comparison = shipped("results/ppo/plan.toml").entries;
+    // Five seeds on five maps, three on three, of three learners; and the first of everything first.
+    assert_eq!(comparison.len(), 3 * (5 * 5 + 3 * 3));
+    let first = &comparison[..24];
+    assert!(first.iter().all(|entry| entry.config.run.seed == 301));
+    let last = &comparison[101];
+    assert_eq!(last.name, "5m_vs_6m-ippo-seed305");
+    assert_eq!(last.config.run.steps_env, 2_000_000);
 }

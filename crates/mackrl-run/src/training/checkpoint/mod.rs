@@ -21,10 +21,14 @@ use mackrl::{
 };
 use serde::{Deserialize, Serialize};
 
-use super::{read_weights, write_weights};
+use super::{Score, read_weights, teams::Best, write_weights};
 
 /// Version of the format; it changes when an older program could not continue from a checkpoint.
-const FORMAT: u64 = 3;
+///
+/// 3: without the best weights, which are not known then.
+const FORMAT: u64 = 4;
+/// The first version that is read.
+const FORMAT_LEAST: u64 = 3;
 /// The largest count that every reader of JSON can hold: 2⁵³.
 const COUNT_MAX: u64 = 1 << 53;
 
@@ -35,6 +39,8 @@ pub struct Checkpoint {
     pub tensors: Vec<u8>,
     /// Counters and sums, as JSON.
     pub counters: Vec<u8>,
+    /// The weights that did best in a test so far, as a file that describes itself.
+    pub best: Option<Vec<u8>>,
 }
 
 /// The trainer's own part.
@@ -55,6 +61,9 @@ pub(super) struct Counters {
     pub(super) interval_steps_env: u64,
     /// What was seen since.
     pub(super) interval: Tally,
+    /// How the best weights so far did in their test.
+    #[serde(default)]
+    pub(super) best: Option<Score>,
 }
 
 /// The JSON object.
@@ -73,6 +82,7 @@ pub(super) struct Opened<'a> {
     tensors: &'a [u8],
     algorithm: BTreeMap<String, u64>,
     pub(super) trainer: Counters,
+    pub(super) best: Option<Best>,
 }
 
 impl StoredState for Opened<'_> {
@@ -93,7 +103,12 @@ struct Format {
 }
 
 impl Checkpoint {
-    pub(super) fn write(algorithm: &AlgorithmState, trainer: &Counters) -> Self {
+    /// Of an algorithm and a trainer, whose counters say how `best` did.
+    pub(super) fn write(
+        algorithm: &AlgorithmState,
+        trainer: &Counters,
+        best: Option<&Best>,
+    ) -> Self {
         let tensors = algorithm.tensors.iter();
         let models: Vec<(&ParameterLayout, &[f32])> = tensors
             .map(|(layout, values)| (layout, values.as_slice()))
@@ -108,6 +123,7 @@ impl Checkpoint {
         Self {
             tensors: write_weights(&models),
             counters: json,
+            best: best.map(|best| best.weights.clone()),
         }
     }
 
@@ -115,19 +131,32 @@ impl Checkpoint {
     pub(super) fn open(&self, is_explained: impl Fn(&str) -> bool) -> Result<Opened<'_>, Error> {
         let numbers = self.numbers()?;
         numbers.check(is_explained)?;
+        let best = match (numbers.trainer.best, &self.best) {
+            (Some(test), Some(weights)) => Some(Best {
+                test,
+                weights: weights.clone(),
+            }),
+            (None, None) => None,
+            _ => {
+                let problem =
+                    "checkpoint has best weights without their test, or a test without them";
+                return Err(Error::Data(problem.to_owned()));
+            }
+        };
         Ok(Opened {
             tensors: &self.tensors,
             algorithm: numbers.algorithm,
             trainer: numbers.trainer,
+            best,
         })
     }
 
     fn numbers(&self) -> Result<Numbers, Error> {
         let broken = |error| Error::Data(format!("counters of the checkpoint: {error}"));
         let Format { format } = serde_json::from_slice(&self.counters).map_err(broken)?;
-        if format != FORMAT {
+        if !(FORMAT_LEAST..=FORMAT).contains(&format) {
             return Err(Error::Data(format!(
-                "checkpoint has format {format}, expected {FORMAT}"
+                "checkpoint has format {format}, expected {FORMAT_LEAST} to {FORMAT}"
             )));
         }
         serde_json::from_slice(&self.counters).map_err(broken)
@@ -146,6 +175,7 @@ impl Numbers {
             next_row,
             interval_steps_env,
             interval,
+            best,
         } = &self.trainer;
         let counts = [
             ("steps_env", *steps_env, COUNT_MAX),
@@ -155,6 +185,11 @@ impl Numbers {
             ("next_test", *next_test, 2 * COUNT_MAX),
             ("next_row", *next_row, 2 * COUNT_MAX),
             ("interval_steps_env", *interval_steps_env, *steps_env),
+            (
+                "best.steps_env",
+                best.map_or(0, |best| best.steps_env),
+                *steps_env,
+            ),
         ];
         let own = self
             .algorithm

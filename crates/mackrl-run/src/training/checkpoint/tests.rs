@@ -98,13 +98,15 @@ fn counters_that_no_run_can_have_are_refused_by_name() {
     let mut message = |from: &str, to: &str| {
         assert!(text.contains(from), "{text}");
         let counters = text.replace(from, to).into_bytes();
-        let tensors = checkpoint.tensors.clone();
-        let damaged = Checkpoint { tensors, counters };
+        let damaged = Checkpoint {
+            counters,
+            ..checkpoint.clone()
+        };
         trainer.restore(&damaged).unwrap_err().to_string()
     };
     assert_eq!(
-        message("\"format\": 3", "\"format\": 2"),
-        "checkpoint has format 2, expected 3"
+        message("\"format\": 4", "\"format\": 2"),
+        "checkpoint has format 2, expected 3 to 4"
     );
     let found = message("\"tests\": 1", "\"tests\": 18446744073709551615");
     assert!(found.contains("as `tests`, expected at most"), "{found}");
@@ -114,6 +116,33 @@ fn counters_that_no_run_can_have_are_refused_by_name() {
     assert!(hash.contains("expected 16 hexadecimal digits"), "{hash}");
     let found = message("\"episodes\"", "\"episode\"");
     assert!(found.contains("unknown field `episode`"), "{found}");
+}
+
+#[test]
+fn the_best_weights_come_back_with_their_test_or_not_at_all() {
+    let (mut trainer, checkpoint) = trained();
+    let (test, weights) = trainer.best().expect("the team was tested");
+    assert_eq!(test.episodes, 3);
+    assert!(test.steps_env <= trainer.steps_env());
+    assert_eq!(checkpoint.best.as_deref(), Some(weights));
+    let without = Checkpoint {
+        best: None,
+        ..checkpoint.clone()
+    };
+    let error = trainer.restore(&without).unwrap_err().to_string();
+    assert!(error.contains("best weights without their test"), "{error}");
+    // As a version wrote it that did not keep them.
+    let mut counters: serde_json::Value = serde_json::from_slice(&checkpoint.counters).unwrap();
+    counters["format"] = 3.into();
+    counters["trainer"].as_object_mut().unwrap().remove("best");
+    let earlier = Checkpoint {
+        counters: counters.to_string().into_bytes(),
+        ..without
+    };
+    trainer.restore(&earlier).unwrap();
+    assert_eq!(trainer.best(), None);
+    trainer.restore(&checkpoint).unwrap();
+    assert!(trainer.checkpoint() == checkpoint);
 }
 
 #[test]
