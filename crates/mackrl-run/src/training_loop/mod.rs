@@ -178,11 +178,11 @@ fn train_into<T: Training>(
 ) -> Result<Summary> {
     let outcome = continue_into(folder, training, config, stop, observer);
     observer.end();
-    let recorded = folder.set_status(match &outcome {
-        Ok(_) => Status::Finished,
-        Err(error) if error.is_interruption() => Status::Interrupted,
-        Err(_) => Status::Failed,
-    });
+    let recorded = match &outcome {
+        Ok(_) => folder.set_status(Status::Finished),
+        Err(error) if error.is_interruption() => folder.set_status(Status::Interrupted),
+        Err(error) => folder.set_failed(error.chain()),
+    };
     // What stopped the training matters more than a status that cannot be written.
     let summary = outcome?;
     recorded?;
