@@ -31,11 +31,8 @@ pub(crate) enum Failure {
     #[error("{message}")]
     RunsStopped { message: String },
     /// A run that another process is making at the moment.
-    #[error("another process is writing in {folder}")]
-    MadeElsewhere {
-        /// Where.
-        folder: String,
-    },
+    #[error("{message}")]
+    MadeElsewhere { message: String },
     /// Two things that were compared are not the same.
     #[error("they differ, first in {first}")]
     Different {

@@ -199,6 +199,112 @@ fn a_sweep_that_is_stopped_or_killed_leaves_no_run_behind() {
     wait_until(|| everywhere("stopped"));
 }
 
+#[test]
+fn a_block_is_made_on_a_disk_of_the_machine_and_its_folders_have_everything() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plan = plan(folder.path(), "\"mackrl\"", "[1, 2, 3]", 1500);
+    let scratch = folder.path().join("disk");
+    let on_disk = ["--scratch", scratch.to_str().expect("a path in UTF-8")];
+    let block = |index: &'static str| {
+        let mut command = sweep(&plan, &["--index", index, "--block", "2", "--jobs", "2"]);
+        command.args(on_disk);
+        command
+    };
+    exits(block("1"), 0);
+    let found: Vec<String> = states(&plan).into_iter().map(|(state, _)| state).collect();
+    assert_eq!(found, ["waiting", "waiting", "finished"]);
+    let run = folder.path().join("out/3m-mackrl-seed3");
+    assert!(
+        outcome(&run) == uninterrupted(),
+        "a run on scratch is another"
+    );
+    let left = fs::read_dir(&scratch).expect("a disk").count();
+    assert_eq!(left, 0, "something is left on the disk");
+    assert!(!run.join("lock").exists());
+    let refusal = exits(block("2"), 2);
+    assert!(
+        refusal.contains("the plan has 3 runs, 2 blocks of 2, expected 0 to 1"),
+        "{refusal}"
+    );
+}
+
+#[test]
+fn a_run_that_is_stopped_on_a_disk_of_the_machine_goes_on_without_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plan = plan(folder.path(), "\"central-v\"", "1", 1_000_000_000);
+    let scratch = folder.path().join("disk");
+    let mut child = sweep(&plan, &["--scratch"])
+        .arg(&scratch)
+        .spawn()
+        .expect("the program starts");
+    let listed = || json(sweep(&plan, &["--list", "--json"]))[0].clone();
+    wait_until(|| listed()["checkpoint"].is_string() && listed()["where"].is_object());
+    let place = listed()["where"].clone();
+    assert_eq!(place["process"], child.id());
+    let made_in = place["scratch"].as_str().expect("a folder");
+    assert!(Path::new(made_in).starts_with(&scratch), "{made_in}");
+    child.kill().expect("a child can be killed");
+    child.wait().expect("a child can be awaited");
+    wait_until(|| listed()["state"] == "stopped");
+    let before = listed()["steps_env"].as_u64();
+    fs::remove_dir_all(&scratch).expect("a disk that is lost");
+    exits(sweep(&plan, &["--index", "0", "--time-limit", "2s"]), 75);
+    assert!(listed()["steps_env"].as_u64() > before);
+}
+
+#[test]
+fn failed_runs_say_why_and_are_made_again_alone_when_that_is_asked() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("plan.toml");
+    let text = format!(
+        "maps = [\"8m\"]\nalgorithms = [\"mackrl\"]\nseeds = 1\n[settings]\nrun.steps_env = 2000\n{SETTINGS}\
+         [variants.fine]\n[variants.huge]\nenv.reward_negative_scale = 1e9\n\
+         env.reward_death_value = 1e9\nenv.reward_only_positive = false\nenv.reward_scale = false\n\
+         algorithm.gradient_norm_max = 1e30\nrun.steps_env = 20000\n"
+    );
+    fs::write(&path, text).expect("a plan");
+    let told = exits(sweep(&path, &["--jobs", "2"]), 65);
+    assert!(
+        told.contains("1 of 2 runs failed: 8m-mackrl-huge"),
+        "{told}"
+    );
+    let failed = json(sweep(&path, &["--list", "--json", "--retry", "failed"]));
+    assert_eq!(failed.as_array().map(Vec::len), Some(1));
+    assert_eq!(failed[0]["index"], 1);
+    let why = failed[0]["failure"].as_str().expect("a reason");
+    assert!(why.starts_with("the run cannot go on: "), "{why}");
+    let told = exits(sweep(&path, &["--retry", "failed"]), 65);
+    assert!(told.contains("1 of 1 runs failed"), "{told}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_batch_script_asks_for_what_is_left_and_needs() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plan = plan(folder.path(), "\"central-v\"", "5", 1500);
+    exits(sweep(&plan, &["--index", "1", "--block", "2"]), 0);
+    let output = sweep(&plan, &["--slurm", "--block", "2", "--jobs", "2"])
+        .output()
+        .expect("the program starts");
+    let script = String::from_utf8(output.stdout).expect("a script");
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{told}");
+    assert!(told.contains("3m-central-v-seed1: "), "{told}");
+    for part in [
+        "#SBATCH --job-name=plan --array=0,2\n",
+        "--cpus-per-task=2\n",
+        "#SBATCH --time=00:0",
+        " --index \"$SLURM_ARRAY_TASK_ID\" --block 2 --jobs 2\n",
+    ] {
+        assert!(script.contains(part), "{part} is missing:\n{script}");
+    }
+    let shell = Command::new("sh").args(["-n", "-c", &script]).status();
+    assert!(shell.expect("a shell").success(), "{script}");
+    exits(sweep(&plan, &[]), 0);
+    let refusal = exits(sweep(&plan, &["--slurm"]), 2);
+    assert!(refusal.contains("nothing is left to do"), "{refusal}");
+}
+
 /// Waits until `condition` holds, for a minute at most.
 fn wait_until(condition: impl Fn() -> bool) {
     let begun = Instant::now();

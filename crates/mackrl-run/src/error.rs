@@ -7,7 +7,10 @@ use std::{fmt::Write as _, io, path::PathBuf};
 use mackrl::NotFinite;
 use thiserror::Error;
 
-use crate::{config::ConfigError, run_folder::WhichWeights};
+use crate::{
+    config::ConfigError,
+    run_folder::{Holder, WhichWeights},
+};
 
 /// What this crate's functions give.
 pub type Result<T, E = RunError> = std::result::Result<T, E>;
@@ -31,10 +34,12 @@ pub enum RunError {
         folder: PathBuf,
     },
     /// A folder in which another process writes.
-    #[error("another process is writing in {}", folder.display())]
+    #[error("another process is writing in {}{}", folder.display(), in_brackets(holder.as_deref()))]
     FolderLocked {
         /// The folder.
         folder: PathBuf,
+        /// Who that is, if it says so.
+        holder: Option<Box<Holder>>,
     },
     /// A folder that was moved or removed while a run was being made in it.
     #[error("{} was moved or removed while the run was being made", folder.display())]
@@ -206,6 +211,11 @@ fn suggested(nearest: Option<&WhichWeights>) -> String {
     nearest.map_or_else(String::new, |nearest| {
         format!(", the nearest are {nearest}")
     })
+}
+
+/// " (process 7 on node1)"; nothing, if it is not known.
+fn in_brackets(holder: Option<&Holder>) -> String {
+    holder.map_or_else(String::new, |holder| format!(" ({holder})"))
 }
 
 /// Says what could not be done.

@@ -4,6 +4,7 @@
 //! ([`training`]) as a configuration ([`config`]) describes them, and records episodes that can be played again ([`replay`]).
 
 mod apart;
+mod batch_system;
 pub mod bounded;
 pub mod config;
 pub mod folder;

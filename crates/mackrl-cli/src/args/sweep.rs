@@ -2,7 +2,7 @@
 
 use std::{num::NonZeroUsize, path::PathBuf, time::Duration};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use crate::args::runs::ThreadsArgs;
 
@@ -10,11 +10,12 @@ use crate::args::runs::ThreadsArgs;
 ///
 /// The plan is a TOML file; examples/sweeps/figure6.toml explains every line of one. Each run has a process and a run folder of its
 /// own, with checkpoints. What is finished is skipped, what is unfinished goes on where it was: stop with Ctrl-C (SIGINT), SIGTERM
-/// or SIGUSR1, and give the same command again. If the command is killed, its runs write a checkpoint and stop.
+/// or SIGUSR1, and give the same command again. If the command is killed, its runs write a checkpoint and stop. Several commands
+/// with one plan, on one machine or on many that share a disk, make each run once.
 ///
-/// --index makes one run in this process, as an array job of a cluster does: it can be given again as often as wanted, goes on
-/// where it was, and ends with exit code 75 if it wants to be started again (after a signal or --time-limit), with 0 once the run is
-/// finished. examples/sweeps/array-job.sh is such a job for SLURM.
+/// On a cluster, --slurm prints a batch script for this plan: `mackrl sweep plan.toml --slurm | sbatch`. docs/cluster.md leads from a laptop
+/// to Slurm, Ray and Kubernetes. --index I makes one run, or with --block N the N runs from I·N on, and ends with exit code 75 if it wants
+/// to be started again.
 ///
 /// Exit codes: 0 all is finished, 65 a run failed, 75 interrupted: give the same command again.
 ///
@@ -29,21 +30,40 @@ pub(crate) struct SweepArgs {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 
-    /// Runs at a time, each on one thread [default: all cores]
-    #[arg(long, value_name = "K", conflicts_with_all = ["index", "list"])]
+    /// Runs at a time, each on one thread; with --slurm, the cores of an array task [default: all cores]
+    #[arg(long, value_name = "K", conflicts_with = "list")]
     jobs: Option<NonZeroUsize>,
 
-    /// Make the run with this number alone, in this process; --list shows the numbers, which begin with 0
-    #[arg(long, value_name = "I", conflicts_with = "list")]
+    /// Make the run with this number alone, in this process, or with --block the block of this number; --list shows the
+    /// numbers, which begin with 0
+    #[arg(long, value_name = "I", conflicts_with_all = ["list", "slurm"])]
     pub(crate) index: Option<usize>,
 
-    /// Stop as after a signal after this time: 90s, 55m or 11h
+    /// Runs that --index stands for, and that an array task of --slurm makes [default of --slurm: some ten minutes' work for
+    /// all its cores]
+    #[arg(long, value_name = "N", conflicts_with = "list")]
+    pub(crate) block: Option<NonZeroUsize>,
+
+    /// Make the runs in DIR, on a disk of this machine; their run folders get every checkpoint
+    #[arg(long, value_name = "DIR", conflicts_with = "list")]
+    pub(crate) scratch: Option<PathBuf>,
+
+    /// Only the runs that failed; they go on from their last checkpoint
+    #[arg(long, value_name = "WHICH")]
+    pub(crate) retry: Option<Retry>,
+
+    /// Stop as after a signal after this time: 90s, 55m or 11h; with --slurm, the time limit of an array task
     #[arg(long, value_name = "TIME", value_parser = duration)]
     pub(crate) time_limit: Option<Duration>,
 
-    /// List the runs and how each stands, and make none
+    /// List the runs, how each stands and where it is made, and make none
     #[arg(long)]
     pub(crate) list: bool,
+
+    /// Print a batch script for Slurm that makes what is not finished, and make nothing; time and memory are measured by half a
+    /// minute of training here
+    #[arg(long, conflicts_with_all = ["list", "json", "threads"])]
+    pub(crate) slurm: bool,
 
     #[command(flatten)]
     pub(crate) threads: ThreadsArgs,
@@ -51,6 +71,17 @@ pub(crate) struct SweepArgs {
     /// Print JSON instead of a table or a sentence
     #[arg(long)]
     pub(crate) json: bool,
+
+    /// Stop as after a signal when stdin ends: whoever holds its other end has ended, however that came
+    #[arg(long, hide = true)]
+    pub(crate) leashed: bool,
+}
+
+/// Which runs are made again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Retry {
+    /// Those that failed
+    Failed,
 }
 
 impl SweepArgs {
@@ -58,6 +89,14 @@ impl SweepArgs {
     pub(crate) fn jobs(&self) -> NonZeroUsize {
         let processors = || std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
         self.jobs.unwrap_or_else(processors)
+    }
+
+    /// Whether the runs are made in processes of their own, not in this one.
+    pub(crate) const fn has_processes(&self) -> bool {
+        self.index.is_none()
+            || self.jobs.is_some()
+            || self.block.is_some()
+            || self.scratch.is_some()
     }
 }
 

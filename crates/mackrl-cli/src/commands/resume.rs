@@ -10,7 +10,7 @@ use std::{
 use mackrl_run::{
     RunError,
     stop_request::StopRequest,
-    sweep::{self, Entry, Outcome},
+    sweep::{self, Entry, Making, Outcome},
     training_loop::{self, Summary},
 };
 
@@ -59,18 +59,20 @@ pub(super) fn go_on(
 /// The error of one run of many; that another process makes it is none.
 pub(super) fn or_made_elsewhere(error: RunError) -> anyhow::Error {
     match error {
-        RunError::FolderLocked { folder } => Failure::MadeElsewhere {
-            folder: folder.display().to_string(),
+        error @ RunError::FolderLocked { .. } => Failure::MadeElsewhere {
+            message: error.to_string(),
         }
         .into(),
         error => error.into(),
     }
 }
 
-/// Makes all runs that are not finished, `jobs` at a time, each in a process that resumes it, and shows how they stand.
+/// Makes all runs that are not finished, `jobs` at a time, each in a process that resumes it, in `scratch` if that is given, and
+/// shows how they stand.
 pub(crate) fn make_all(
     entries: &[Entry],
     jobs: NonZeroUsize,
+    scratch: Option<&Path>,
     stop: &StopRequest,
 ) -> anyhow::Result<Outcome> {
     let program = this_program()?;
@@ -81,12 +83,11 @@ pub(crate) fn make_all(
             .arg(folder);
         command
     };
-    let mut progress = SweepProgress::new();
-    Ok(sweep::make_all(
-        entries,
+    let making = Making {
         jobs,
-        &process,
-        stop,
-        &mut progress,
-    )?)
+        process: &process,
+        scratch,
+    };
+    let mut progress = SweepProgress::new();
+    Ok(sweep::make_all(entries, &making, stop, &mut progress)?)
 }

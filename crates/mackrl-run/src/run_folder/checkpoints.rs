@@ -138,7 +138,7 @@ fn make(
     disk::sync_folder(disk, run, disk::parent(place))
 }
 
-fn remove(disk: &dyn Disk, run: &Folder, number: u64) -> Result<()> {
+pub(super) fn remove(disk: &dyn Disk, run: &Folder, number: u64) -> Result<()> {
     let place = place(number);
     let temporary = disk::temporary(&place);
     disk::rename(disk, run, &place, &temporary)?;
@@ -273,12 +273,12 @@ fn differs(folder: &Folder, path: &Path) -> RunError {
     RunError::BadData { message }
 }
 
-fn place(number: u64) -> PathBuf {
+pub(super) fn place(number: u64) -> PathBuf {
     Path::new(CHECKPOINTS).join(format!("{number:0DIGITS$}"))
 }
 
 /// The numbers of all checkpoints, in order.
-fn numbers(run: &Folder) -> Result<Vec<u64>> {
+pub(super) fn numbers(run: &Folder) -> Result<Vec<u64>> {
     let entries = run.entries(CHECKPOINTS)?;
     let whole = entries.iter().filter(|(name, _)| name.len() == DIGITS);
     let mut numbers: Vec<u64> = whole.filter_map(|(name, _)| name.parse().ok()).collect();

@@ -25,6 +25,8 @@ use crate::{
 pub struct Description {
     /// How far it has come.
     pub status: Status,
+    /// Of a run that failed, why, if it says so.
+    pub failure: Option<String>,
     /// Where its results come from: one entry for each version of the program that went on with it.
     pub provenance: Vec<Provenance>,
     /// Metrics that were found damaged and put aside: what they held is missing.
@@ -48,9 +50,16 @@ pub fn read_description(path: &Path) -> Result<(Config, Description)> {
     let run = StoredRun::open(path)?;
     let status = run.status();
     let kept = kept::listed(&run.folder)?;
-    let (mut provenance, metrics_put_aside, teams) =
+    let (mut provenance, metrics_put_aside, teams, failure) =
         run.record.map_or_else(Default::default, |record| {
-            (record.provenance, record.metrics_put_aside, record.teams)
+            let super::record::RunRecord {
+                provenance,
+                metrics_put_aside,
+                teams,
+                failure,
+                ..
+            } = record;
+            (provenance, metrics_put_aside, teams, failure)
         });
     let config = run.config.config;
     if provenance.is_empty() {
@@ -59,12 +68,20 @@ pub fn read_description(path: &Path) -> Result<(Config, Description)> {
     }
     let description = Description {
         status,
+        failure,
         provenance,
         metrics_put_aside,
         teams,
         kept,
     };
     Ok((config, description))
+}
+
+/// The folder of the latest whole checkpoint of the run at `path`, if there is one.
+pub(crate) fn latest_checkpoint(path: &Path) -> Option<PathBuf> {
+    let numbers = checkpoints::numbers(&Folder::open(path).ok()?).ok()?;
+    let latest = numbers.last()?;
+    Some(path.join(checkpoints::place(*latest)))
 }
 
 /// Puts `content` at `path`: a reader, and a machine that loses power, finds the old content or the new.

@@ -10,7 +10,7 @@
 //! DIR/weights/              those that did best in a test, and those of every so many steps, if `run.weights_interval_steps_env` is set
 //! DIR/events.out.tfevents.* the metrics for TensorBoard, if `run.tensorboard` is set; one file for each process that trained
 //! DIR/replays/              episodes that `mackrl evaluate --save-replays` kept
-//! DIR/lock                  held by the process that writes
+//! DIR/lock                  of the process that writes, while it does: who it is
 //! DIR/metrics.jsonl.damaged metrics that were not those of the checkpoint when the run continued, put aside
 //! ```
 //!
@@ -23,6 +23,7 @@
 //! Metrics that are not those of the checkpoint cost no checkpoint: they are put aside, with a warning.
 
 mod checkpoints;
+mod claim;
 mod description;
 mod disk;
 mod event_file;
@@ -30,6 +31,7 @@ mod kept;
 mod latest;
 mod manifest;
 mod metrics_file;
+mod mirror;
 mod record;
 mod recorded;
 mod rows;
@@ -37,13 +39,16 @@ mod stored;
 mod untrusted;
 
 use std::{
-    fs::{self, File, TryLockError},
+    fs::{self, File},
     io,
     path::{Path, PathBuf},
 };
 
-use cap_std::fs::OpenOptions;
 use checkpoints::Surroundings;
+use claim::Claim;
+pub use claim::Holder;
+pub(crate) use claim::Occupation;
+pub(crate) use description::latest_checkpoint;
 pub use description::{
     Description, is_run, keep_replay, read_checkpoint, read_description, replace,
 };
@@ -54,6 +59,7 @@ pub use kept::WhichWeights;
 pub use latest::{LatestRow, latest_row};
 use mackrl::nn::InstructionSet;
 use manifest::{Fingerprint, Growing};
+pub use mirror::Mirror;
 pub use record::Status;
 use record::{RunRecord, build, read_record};
 pub use recorded::{Recorded, timeless};
@@ -61,6 +67,7 @@ pub use rows::{Following, Row, follow_rows, read_rows};
 pub use stored::Run;
 pub(crate) use stored::{Completeness, StoredRun};
 
+pub use crate::batch_system::Job;
 use crate::{
     config::Config,
     error::{Context, Result, RunError},
@@ -93,8 +100,8 @@ pub struct RunFolder {
     events: Option<EventFile>,
     checkpoints_kept: usize,
     record: RunRecord,
-    /// No other process writes while this is open.
-    lock: File,
+    /// No other process writes while this lives.
+    claim: Claim,
 }
 
 /// A run that goes on.
@@ -139,7 +146,7 @@ impl RunFolder {
         Self::check_free(path)?;
         fs::create_dir_all(path).with_context(|| format!("cannot create {}", path.display()))?;
         let folder = Folder::open(path)?;
-        let lock = lock(&folder)?;
+        let claim = Claim::acquire(&folder, None)?;
         // Another process may have been quicker, and be done already.
         expect_free(&folder)?;
         let text = config.to_toml();
@@ -149,7 +156,7 @@ impl RunFolder {
             folder,
             (config, fingerprint),
             threads,
-            lock,
+            claim,
             Growing::default(),
         )
     }
@@ -162,14 +169,6 @@ impl RunFolder {
         Self::create(path, config, threads)?.set_status(Status::Interrupted)
     }
 
-    /// Whether a process writes there now.
-    pub fn is_in_use(path: &Path) -> bool {
-        let lock = Folder::open(path).and_then(|folder| folder.file(LOCK));
-        lock.is_ok_and(|lock| {
-            lock.is_some_and(|lock| matches!(lock.try_lock(), Err(TryLockError::WouldBlock)))
-        })
-    }
-
     /// Opens the folder of an unfinished run at its latest checkpoint. What was written after it is removed: it will be written
     /// again.
     ///
@@ -177,7 +176,7 @@ impl RunFolder {
     /// [`RunError::NotARun`], [`RunError::FolderLocked`] if another process writes there, [`RunError::BadData`] if no checkpoint can be used; otherwise the path that could not be read or written.
     pub fn resume(path: &Path, threads: usize) -> Result<Resumption> {
         let folder = StoredRun::open(path)?.folder;
-        let lock = lock(&folder)?;
+        let claim = Claim::acquire(&folder, None)?;
         // Another process may have gone on meanwhile.
         let StoredRun {
             folder,
@@ -214,7 +213,7 @@ impl RunFolder {
             _ => None,
         };
         let metrics = metrics.flatten().unwrap_or_default();
-        let mut opened = Self::open(folder, (&config, fingerprint), threads, lock, metrics)?;
+        let mut opened = Self::open(folder, (&config, fingerprint), threads, claim, metrics)?;
         opened.kept = kept;
         if let Some(name) = &put_aside {
             opened.record.metrics_put_aside.push(name.clone());
@@ -236,7 +235,7 @@ impl RunFolder {
         folder: Folder,
         (config, fingerprint): (&Config, Fingerprint),
         threads: usize,
-        lock: File,
+        claim: Claim,
         metrics_so_far: Growing,
     ) -> Result<Self> {
         let metrics = metrics_file::open(&folder, metrics_so_far.bytes())?;
@@ -249,6 +248,7 @@ impl RunFolder {
             simd: None,
             build: None,
             status: Status::Running,
+            failure: None,
             metrics_put_aside: Vec::new(),
             teams: None,
             files: Default::default(),
@@ -272,7 +272,7 @@ impl RunFolder {
             events: None,
             checkpoints_kept: config.run.checkpoints_kept,
             record,
-            lock,
+            claim,
         };
         folder.set_status(Status::Running)?;
         Ok(folder)
@@ -364,8 +364,21 @@ impl RunFolder {
     /// # Errors
     /// Path, bytes and what the operating system says.
     pub fn set_status(&mut self, status: Status) -> Result<()> {
-        self.expect_lock()?;
+        self.record_status(status, None)
+    }
+
+    /// Records that the run failed, and why.
+    ///
+    /// # Errors
+    /// Path, bytes and what the operating system says.
+    pub fn set_failed(&mut self, why: String) -> Result<()> {
+        self.record_status(Status::Failed, Some(why))
+    }
+
+    fn record_status(&mut self, status: Status, failure: Option<String>) -> Result<()> {
+        self.expect_claim()?;
         self.record.status = status;
+        self.record.failure = failure;
         self.record.files.clear();
         if status == Status::Finished {
             let own = [
@@ -388,35 +401,14 @@ impl RunFolder {
         disk::replace(&*self.disk, &self.folder, Path::new(name), content)
     }
 
-    /// Makes sure that the lock in the folder is the one that is held: the content may have been removed, and another run begun.
-    fn expect_lock(&self) -> Result<()> {
-        let there = self.folder.dir().symlink_metadata(LOCK).ok();
-        let held = self.lock.metadata().ok();
-        #[cfg(unix)]
-        let is_own = {
-            use cap_std::fs::MetadataExt as _;
-            use std::os::unix::fs::MetadataExt as _;
-            let there = there.map(|there| (there.dev(), there.ino()));
-            held.is_some_and(|held| there == Some((held.dev(), held.ino())))
-        };
-        // Elsewhere a file that is open keeps its name and its folder.
-        #[cfg(not(unix))]
-        let is_own = held.is_some() && there.is_some();
-        self.replaced_unless(is_own)
+    /// Makes sure that the folder is still claimed by this process.
+    fn expect_claim(&self) -> Result<()> {
+        self.replaced_unless(self.claim.is_held())
     }
 
-    /// As [`Self::expect_lock`], and that the folder still lies where it was opened.
+    /// As [`Self::expect_claim`], and that the folder still lies where it was opened.
     fn expect_own(&self) -> Result<()> {
-        self.expect_lock()?;
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::MetadataExt as _;
-            let identity = |file: fs::Metadata| (file.dev(), file.ino());
-            let there = fs::symlink_metadata(self.path().join(LOCK)).map(identity);
-            let held = self.lock.metadata().map(identity);
-            self.replaced_unless(there.ok() == held.ok())?;
-        }
-        Ok(())
+        self.replaced_unless(self.claim.is_held_at(self.path()))
     }
 
     fn replaced_unless(&self, is_own: bool) -> Result<()> {
@@ -449,24 +441,6 @@ fn expect_free(there: &Folder) -> Result<()> {
             holds: "other files",
         },
     })
-}
-
-/// Takes the folder for this process until the file is closed; the operating system closes it, however the process ends.
-fn lock(folder: &Folder) -> Result<File> {
-    let path = Path::new(LOCK);
-    let mut options = OpenOptions::new();
-    options.create(true).write(true);
-    let lock = folder
-        .open_with(path, &options)
-        .with_context(|| folder.cannot("open", path))?;
-    match lock.try_lock() {
-        Ok(()) => Ok(lock),
-        Err(TryLockError::WouldBlock) => {
-            let folder = folder.path().to_owned();
-            Err(RunError::FolderLocked { folder })
-        }
-        Err(TryLockError::Error(error)) => Err(error).with_context(|| folder.cannot("lock", path)),
-    }
 }
 
 #[cfg(test)]

@@ -39,6 +39,9 @@ pub(super) struct RunRecord {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) build: Option<String>,
     pub(super) status: Status,
+    /// Of a run that failed, why.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) failure: Option<String>,
     /// Files of metrics that were found damaged and put aside; what they held is missing in `metrics.jsonl`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) metrics_put_aside: Vec<String>,

@@ -14,9 +14,9 @@ use serde::Serialize;
 use crate::{
     config::Config,
     error::{Result, RunError},
-    run_folder::{self, LatestRow, RunFolder, Status},
+    run_folder::{self, Holder, LatestRow, Occupation, RunFolder, Status},
 };
-pub use engine::{Observer, Outcome, make_all};
+pub use engine::{Making, Observer, Outcome, make_all};
 pub use plan::Plan;
 
 /// One run of a sweep.
@@ -59,15 +59,88 @@ impl State {
     }
 }
 
+/// How a run stands, and what else is known then.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Standing {
+    /// How it stands.
+    pub state: State,
+    /// Of a running one, where: the process that makes it, if it says who it is.
+    pub holder: Option<Holder>,
+    /// Of a failed one, why, if it says so.
+    pub failure: Option<String>,
+}
+
+impl Standing {
+    /// Of a run of which nothing more is known.
+    const fn only(state: State) -> Self {
+        Self {
+            state,
+            holder: None,
+            failure: None,
+        }
+    }
+}
+
+/// How these runs stand. A batch system is asked once, for all that are made in jobs of it on other machines.
+pub fn standings<'a>(entries: impl IntoIterator<Item = &'a Entry>) -> Vec<Result<Standing>> {
+    let seen: Vec<Result<Seen>> = entries.into_iter().map(Entry::look).collect();
+    let occupation = |seen: &Result<Seen>| match seen {
+        Ok(Seen { occupation, .. }) => occupation.clone(),
+        Err(_) => Occupation::Free,
+    };
+    let occupations = Occupation::settled(seen.iter().map(occupation).collect());
+    let both = seen.into_iter().zip(occupations);
+    both.map(|(seen, occupation)| Ok(seen?.standing(occupation)))
+        .collect()
+}
+
+/// What can be seen of a run without asking a batch system.
+struct Seen {
+    /// How far it has come; nothing, if it has not begun.
+    status: Option<Status>,
+    failure: Option<String>,
+    occupation: Occupation,
+}
+
+impl Seen {
+    fn standing(self, occupation: Occupation) -> Standing {
+        let mut standing = Standing::only(match self.status {
+            None => State::Waiting,
+            Some(Status::Finished) => State::Finished,
+            _ if occupation != Occupation::Free => State::Running,
+            Some(Status::Failed) => State::Failed,
+            Some(Status::Running | Status::Interrupted) => State::Stopped,
+        });
+        match (standing.state, occupation) {
+            (State::Running, Occupation::Held(holder)) => standing.holder = holder,
+            (State::Failed, _) => standing.failure = self.failure,
+            _ => {}
+        }
+        standing
+    }
+}
+
 impl Entry {
     /// How the run stands.
     ///
     /// # Errors
     /// [`RunError::OtherConfiguration`] if the folder holds a run with another configuration.
     pub fn state(&self) -> Result<State> {
+        let mut standings = standings([self]);
+        let standing = standings.pop().expect("one for each entry")?;
+        Ok(standing.state)
+    }
+
+    fn look(&self) -> Result<Seen> {
         if !run_folder::is_run(&self.folder) {
             match RunFolder::check_free(&self.folder) {
-                Ok(()) => return Ok(State::Waiting),
+                Ok(()) => {
+                    return Ok(Seen {
+                        status: None,
+                        failure: None,
+                        occupation: Occupation::Free,
+                    });
+                }
                 // Another process has begun it since.
                 Err(RunError::UnfinishedRun { .. }) => {}
                 Err(error) => return Err(error),
@@ -78,11 +151,14 @@ impl Entry {
             let folder = self.folder.clone();
             return Err(RunError::OtherConfiguration { folder, key });
         }
-        Ok(match description.status {
-            Status::Finished => State::Finished,
-            _ if RunFolder::is_in_use(&self.folder) => State::Running,
-            Status::Failed => State::Failed,
-            Status::Running | Status::Interrupted => State::Stopped,
+        let occupation = match description.status {
+            Status::Finished => Occupation::Free,
+            _ => Occupation::of(&self.folder),
+        };
+        Ok(Seen {
+            status: Some(description.status),
+            failure: description.failure,
+            occupation,
         })
     }
 
@@ -108,6 +184,11 @@ impl Entry {
             Err(RunError::FolderInUse { .. }) if run_folder::is_run(&self.folder) => Ok(true),
             outcome => outcome.map(|()| true),
         }
+    }
+
+    /// The folder of its latest whole checkpoint, if it has one.
+    pub fn checkpoint(&self) -> Option<PathBuf> {
+        run_folder::latest_checkpoint(&self.folder)
     }
 
     /// What the run last wrote down.

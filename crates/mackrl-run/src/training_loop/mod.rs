@@ -195,7 +195,7 @@ fn train_into<T: Training>(
     let recorded = match &outcome {
         Ok(summary) => folder.finish(summary.teams.clone()),
         Err(error) if error.is_interruption() => folder.set_status(Status::Interrupted),
-        Err(_) => folder.set_status(Status::Failed),
+        Err(error) => folder.set_failed(error.chain()),
     };
     // What stopped the training matters more than a status that cannot be written.
     let summary = outcome?;

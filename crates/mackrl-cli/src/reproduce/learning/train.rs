@@ -43,7 +43,7 @@ pub(super) fn train_all(
     let entries: Vec<Entry> = (missing.iter())
         .map(|&job| jobs[job].entry(options))
         .collect::<anyhow::Result<_>>()?;
-    let outcome = make_all(&entries, options.jobs(), &signals::listen()?)?;
+    let outcome = make_all(&entries, options.jobs(), None, &signals::listen()?)?;
     expect_all(&outcome, entries.len())?;
     for (job, entry) in missing.into_iter().zip(&entries) {
         runs[job] = Some(jobs[job].keep(entry, options)?);

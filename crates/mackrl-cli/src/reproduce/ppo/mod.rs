@@ -86,7 +86,7 @@ pub(crate) fn run(options: &PpoOptions) -> anyhow::Result<Report> {
     } else {
         let processors = || std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
         let jobs = options.jobs.unwrap_or_else(processors);
-        Some(make_all(&missing, jobs, &signals::listen()?)?)
+        Some(make_all(&missing, jobs, None, &signals::listen()?)?)
     };
     runs::keep_finished(&missing, &options.out)?;
     let cells = runs::cells(&plan.entries, &options.out);

@@ -158,7 +158,7 @@ impl ZooOptions {
 pub(crate) fn run(options: &ZooOptions) -> anyhow::Result<Report> {
     let entries = options.entries()?;
     make_folder(&options.out)?;
-    let outcome = make_all(&entries, options.jobs(), &signals::listen()?)?;
+    let outcome = make_all(&entries, options.jobs(), None, &signals::listen()?)?;
     expect_all(&outcome, entries.len())?;
     let report = Report::read(&entries)?;
     super::save(&options.out, "zoo", &report, &[])?;
