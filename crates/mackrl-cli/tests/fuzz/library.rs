@@ -232,7 +232,9 @@ impl Target for Checkpoints {
     }
 
     fn seeds(&self) -> Vec<Vec<u8>> {
-        let Checkpoint { tensors, counters } = Self::default().sound();
+        let Checkpoint {
+            tensors, counters, ..
+        } = Self::default().sound();
         vec![tensors, counters]
     }
 

@@ -26,6 +26,7 @@ mod disk;
 mod event_file;
 mod latest;
 mod manifest;
+mod memory;
 mod record;
 mod recorded;
 mod rows;
@@ -181,7 +182,11 @@ impl RunFolder {
             })
             .filter(|versions| *versions != Versions::OWN);
         let tensors_max = tensors_bytes_max(&config.config)?;
-        let (latest, damaged) = checkpoints::latest(&folder, &config, tensors_max)?;
+        let (latest, damaged) = checkpoints::latest(
+            &folder,
+            &config,
+            (checkpoints::Wanted::Everything, tensors_max),
+        )?;
         let number = latest.as_ref().map(|stored| stored.number);
         checkpoints::tidy(&RealDisk, &folder, number)?;
         let fingerprint = config.fingerprint();

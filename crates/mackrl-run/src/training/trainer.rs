@@ -231,7 +231,12 @@ impl Trainer {
             interval_steps_env: self.interval.steps_env,
             interval: self.interval.tally.clone(),
         };
-        Checkpoint::write(&self.algorithm.state(), &counters)
+        let mut state = self.algorithm.state();
+        if self.finished() {
+            // It is large, and nothing is learnt any more.
+            state.memory = None;
+        }
+        Checkpoint::write(&state, &counters)
     }
 
     /// Continues where `checkpoint` was taken: what follows is the same to the byte as if there had been no interruption.
@@ -241,7 +246,8 @@ impl Trainer {
     pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), Error> {
         let metrics = self.algorithm.metrics();
         let statistics = &self.world.spec().statistics;
-        let opened = checkpoint.open(|name| is_explained(name, metrics, statistics))?;
+        let mut opened = checkpoint.open(|name| is_explained(name, metrics, statistics))?;
+        opened.is_last = opened.trainer.steps_env >= self.config.run.steps_env;
         self.algorithm.restore(&opened)?;
         let counters = opened.trainer;
         self.steps_env = counters.steps_env;

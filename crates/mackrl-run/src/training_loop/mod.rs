@@ -205,7 +205,9 @@ impl Snapshot {
 
     /// Writes it, unless that takes too long when a stop was asked for: then the run goes on from the checkpoint before.
     fn write_in_time(&self, folder: &mut RunFolder) -> Result<()> {
-        let Checkpoint { tensors, counters } = &self.checkpoint;
+        let Checkpoint {
+            tensors, counters, ..
+        } = &self.checkpoint;
         if tensors.len() + counters.len() > QUICKLY_WRITTEN {
             return Ok(());
         }

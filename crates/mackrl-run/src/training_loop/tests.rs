@@ -44,6 +44,7 @@ impl Training for Counting {
         Checkpoint {
             tensors: vec![5],
             counters: self.updates.to_le_bytes().to_vec(),
+            memory: None,
         }
     }
 

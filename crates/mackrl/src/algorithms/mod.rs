@@ -64,7 +64,7 @@ pub trait Algorithm: Send + Debug {
         stopwatch: &mut Stopwatch,
     ) -> Result<Tally, Error>;
 
-    /// Policy updates so far.
+    /// Batches learnt from so far: policy updates, but for learners that only remember the first batches.
     fn updates(&self) -> u64;
 
     /// Names (or the parts before a number) and meanings of what [`learn`](Self::learn) and the policy's actors report.

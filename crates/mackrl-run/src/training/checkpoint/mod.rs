@@ -10,12 +10,15 @@
 //! | `target.NAME` | the same parameter of the target critic |
 //! | `opt.adam.m.NAME`, `opt.adam.v.NAME` | Adam's averages of gradients and of their squares |
 //! | `opt.rmsprop.v.NAME` | `RMSprop`'s averages of squared gradients |
+//!
+//! Learners that remember episodes have a replay memory beside them, whose episodes are encoded by `mackrl::experience`.
 
 use std::collections::BTreeMap;
 
 use mackrl::{
     Error,
     algorithms::{AlgorithmState, StoredState},
+    experience::MemoryState,
     nn::ParameterLayout,
     policy::Tally,
 };
@@ -35,6 +38,8 @@ pub struct Checkpoint {
     pub tensors: Vec<u8>,
     /// Counters and sums, as JSON.
     pub counters: Vec<u8>,
+    /// What a replay memory holds, if the algorithm has one and the run goes on.
+    pub memory: Option<MemoryState>,
 }
 
 /// The trainer's own part.
@@ -71,6 +76,9 @@ struct Numbers {
 #[derive(Debug)]
 pub(super) struct Opened<'a> {
     tensors: &'a [u8],
+    memory: Option<&'a MemoryState>,
+    /// Whether the run ended here, and needs no replay memory any more.
+    pub(super) is_last: bool,
     algorithm: BTreeMap<String, u64>,
     pub(super) trainer: Counters,
 }
@@ -83,6 +91,17 @@ impl StoredState for Opened<'_> {
     fn counter(&self, name: &str) -> Result<u64, Error> {
         let count = self.algorithm.get(name).copied();
         count.ok_or_else(|| Error::Data(format!("checkpoint has no count `{name}`")))
+    }
+
+    fn memory(&self) -> Result<MemoryState, Error> {
+        match self.memory {
+            Some(memory) => Ok(memory.clone()),
+            None if self.is_last => Ok(MemoryState {
+                first: self.trainer.episodes,
+                episodes: Vec::new(),
+            }),
+            None => Err(Error::Data("checkpoint has no replay memory".to_owned())),
+        }
     }
 }
 
@@ -108,6 +127,7 @@ impl Checkpoint {
         Self {
             tensors: write_weights(&models),
             counters: json,
+            memory: algorithm.memory.clone(),
         }
     }
 
@@ -117,6 +137,8 @@ impl Checkpoint {
         numbers.check(is_explained)?;
         Ok(Opened {
             tensors: &self.tensors,
+            memory: self.memory.as_ref(),
+            is_last: false,
             algorithm: numbers.algorithm,
             trainer: numbers.trainer,
         })

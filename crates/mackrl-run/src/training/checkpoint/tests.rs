@@ -98,8 +98,10 @@ fn counters_that_no_run_can_have_are_refused_by_name() {
     let mut message = |from: &str, to: &str| {
         assert!(text.contains(from), "{text}");
         let counters = text.replace(from, to).into_bytes();
-        let tensors = checkpoint.tensors.clone();
-        let damaged = Checkpoint { tensors, counters };
+        let damaged = Checkpoint {
+            counters,
+            ..checkpoint.clone()
+        };
         trainer.restore(&damaged).unwrap_err().to_string()
     };
     assert_eq!(
