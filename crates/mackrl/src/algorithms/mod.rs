@@ -6,8 +6,11 @@
 
 mod actor_critic;
 mod central_v;
+mod iql;
 mod mackrl;
 mod ppo;
+mod q_learning;
+mod qmix;
 mod state;
 
 use std::{fmt::Debug, sync::Arc};
@@ -19,10 +22,13 @@ use mackrl_env::{
 
 pub use actor_critic::{ActorCritic, ActorCriticSettings, OptimiserName};
 pub use central_v::CentralV;
+pub use iql::{Iql, Unmixed};
 pub use mackrl::{Levels, Mackrl, MackrlSettings, PartitionChoice};
 pub use ppo::{
     Groups, Ippo, MackrlPpo, MackrlPpoSettings, Mappo, PairMemory, Ppo, PpoSettings, Sight,
 };
+pub use q_learning::{ActionValues, QLearner, QLearningSettings};
+pub use qmix::{Qmix, QmixSettings};
 pub use state::{AlgorithmState, StoredState};
 
 use crate::{
@@ -188,6 +194,8 @@ pub fn built_in() -> Vec<Arc<dyn AlgorithmKind>> {
         Arc::new(MackrlPpo),
         Arc::new(Mappo::default()),
         Arc::new(Ippo::default()),
+        Arc::new(Iql),
+        Arc::new(Qmix),
     ]
 }
 
