@@ -12,6 +12,7 @@ mod ppo;
 mod q_learning;
 mod qmix;
 mod state;
+mod vdn;
 
 use std::{fmt::Debug, sync::Arc};
 
@@ -30,6 +31,7 @@ pub use ppo::{
 pub use q_learning::{ActionValues, QLearner, QLearningSettings};
 pub use qmix::{Qmix, QmixSettings};
 pub use state::{AlgorithmState, StoredState};
+pub use vdn::{Summed, Vdn};
 
 use crate::{
     Error, Stopwatch,
@@ -195,6 +197,7 @@ pub fn built_in() -> Vec<Arc<dyn AlgorithmKind>> {
         Arc::new(Mappo::default()),
         Arc::new(Ippo::default()),
         Arc::new(Iql),
+        Arc::new(Vdn),
         Arc::new(Qmix),
     ]
 }

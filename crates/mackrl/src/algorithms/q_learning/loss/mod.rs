@@ -258,3 +258,6 @@ fn write_targets<E: Element>(
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
