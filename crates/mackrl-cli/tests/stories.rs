@@ -165,8 +165,8 @@ fn a_value_out_of_range_says_what_is_expected() {
     error: --set algorithm.gamma=2: `algorithm.gamma` is 2.0, expected a number in [0, 1]
     hint: algorithm.gamma: Discount γ of one environment step.
     ");
-    insta::assert_snapshot!(type_in("config --algorithm qmix").fails(64), @r#"
-    error: --algorithm qmix: `algorithm.name` is "qmix", expected `mackrl`, `central-v`, `mackrl-ppo`, `mappo` or `ippo`
+    insta::assert_snapshot!(type_in("config --algorithm maddpg").fails(64), @r#"
+    error: --algorithm maddpg: `algorithm.name` is "maddpg", expected `mackrl`, `central-v`, `mackrl-ppo`, `mappo`, `ippo`, `iql`, `vdn` or `qmix`
     hint: algorithm.name: What learns; which other settings `algorithm` has depends on it.
     "#);
 }
@@ -185,7 +185,7 @@ fn a_setting_of_version_0_1_0_is_told_by_its_name_now() {
 
 #[test]
 fn an_unknown_preset_names_its_neighbour() {
-    insta::assert_snapshot!(type_in("config --preset papre").fails(64), @"error: unknown preset `papre`, expected default, fours, paper, paper-code, paper-figures, did you mean `paper`?");
+    insta::assert_snapshot!(type_in("config --preset papre").fails(64), @"error: unknown preset `papre`, expected default, fours, paper, paper-code, paper-figures, pymarl-iql, pymarl-vdn, pymarl-qmix, pymarl2-qmix, pymarl-coma, did you mean `paper`?");
 }
 
 #[test]
@@ -238,6 +238,11 @@ fn a_setting_is_explained_with_its_value_everywhere() {
       preset paper       0.8   "TD-lambda of 0.8"
       preset paper-code  0.8
       preset paper-figures  0.8
+      preset pymarl-iql  0.95  td_lambda: targets look one step ahead
+      preset pymarl-vdn  0.95  td_lambda: targets look one step ahead
+      preset pymarl-qmix  0.95  td_lambda: targets look one step ahead
+      preset pymarl2-qmix  0.95  td_lambda
+      preset pymarl-coma  0.95  td_lambda
       here               0.5   --set algorithm.lambda=0.5
     "#);
     let section = type_in("config --explain test --json").succeeds();
@@ -299,7 +304,7 @@ fn every_measurement_says_what_it_measured() {
         update["median_ms"].as_f64() >= update["min_ms"].as_f64(),
         "{update}"
     );
-    for algorithm in ["mackrl", "central-v", "mackrl-ppo", "ippo"] {
+    for algorithm in ["mackrl", "central-v", "mackrl-ppo", "ippo", "qmix"] {
         let line =
             format!("bench train --steps 300 --algorithm {algorithm} --set test.episodes=3 --json");
         let training = measured(&line);

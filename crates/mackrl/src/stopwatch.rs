@@ -19,7 +19,9 @@ pub enum Phase {
     Marginal,
     /// The critic's sweep: its own updates, λ-returns and advantages.
     Critic,
-    /// The backward pass through the controllers.
+    /// Remembering new episodes, and drawing remembered ones.
+    Memory,
+    /// The backward pass through the controllers; where remembered episodes are learnt from, the forward passes as well.
     Backward,
     /// Clipping, the optimiser's step and preparing the new weights.
     Optimiser,
@@ -39,12 +41,13 @@ pub struct Stopwatch {
 
 impl Phase {
     /// Every phase, in the order in which a step meets them.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Simulate,
         Self::CommonKnowledge,
         Self::Act,
         Self::Marginal,
         Self::Critic,
+        Self::Memory,
         Self::Backward,
         Self::Optimiser,
         Self::Test,
@@ -60,6 +63,7 @@ impl Phase {
             Self::Act => "act",
             Self::Marginal => "marginal",
             Self::Critic => "critic",
+            Self::Memory => "memory",
             Self::Backward => "backward",
             Self::Optimiser => "optimiser",
             Self::Test => "test",

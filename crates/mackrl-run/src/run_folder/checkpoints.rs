@@ -5,6 +5,7 @@
 //!     tensors.safetensors                parameters, target critic, moments of the optimisers
 //!     counters.json                      counters, schedules, sums of the unfinished row of metrics
 //!     best.safetensors                   the weights that did best in a test so far, as the run folder has them
+//!     memory.episodes, memory-*.episodes a replay memory, if the algorithm has one; see [`memory`]
 //!     manifest.json                      length and hash of these, of config.toml, of metrics.jsonl so far, and of other
 //!                                        weights that the run folder keeps
 //! ```
@@ -13,13 +14,17 @@
 //! is whole, whenever the program or the machine stopped. Two checkpoints of one number are equal to the byte, because a run
 //! is a function of its configuration.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use super::{
     CHECKPOINTS, CONFIG, METRICS,
     disk::{self, Disk},
     kept::Kept,
     manifest::{FORMAT, Fingerprint, Growing, Manifest},
+    memory::{self, MEMORY},
     stored::ConfigFile,
     untrusted,
 };
@@ -73,59 +78,90 @@ pub(super) fn write(
     let place = place(number);
     if run.kind(&place)?.is_none() {
         disk::ensure_folder(disk, run, Path::new(CHECKPOINTS))?;
-        make(disk, run, &place, &contents(checkpoint), surroundings)?;
+        let mut numbers = numbers(run)?;
+        numbers.retain(|&other| other < number);
+        let before = numbers.last().map(|&before| self::place(before));
+        make(disk, run, &place, (checkpoint, before), surroundings)?;
     }
     let mut numbers = numbers(run)?;
     numbers.retain(|&other| other <= number);
-    for &old in &numbers[..numbers.len().saturating_sub(kept)] {
-        remove(disk, run, old)?;
+    let superfluous = numbers.len().saturating_sub(kept);
+    for (position, &old) in numbers.iter().enumerate() {
+        if position < superfluous || old < number && outlives_memory(run, checkpoint, old)? {
+            remove(disk, run, old)?;
+        }
     }
     Ok(())
 }
 
-/// The files of a checkpoint.
-fn contents(checkpoint: &Checkpoint) -> Vec<(&'static str, &[u8])> {
-    let best = checkpoint.best.iter();
-    let mut contents: Vec<(&str, &[u8])> = vec![
-        (TENSORS, &checkpoint.tensors),
-        (COUNTERS, &checkpoint.counters),
-    ];
-    contents.extend(best.map(|best| (BEST, best.as_slice())));
-    contents
+/// Whether an earlier checkpoint has a replay memory and this one, the last of a run, needs none any more: memories are large.
+fn outlives_memory(run: &Folder, checkpoint: &Checkpoint, earlier: u64) -> Result<bool> {
+    Ok(checkpoint.memory.is_none() && run.kind(&place(earlier).join(MEMORY))?.is_some())
 }
 
-/// Makes a folder of these files and their manifest; what could not be completed is removed again, since a full disk needs the
-/// room.
+/// Makes a folder of the checkpoint's files and their manifest; what could not be completed is removed again, since a full disk
+/// needs the room. Blocks of a replay memory are linked where the checkpoint `before` has them.
 fn make(
     disk: &dyn Disk,
     run: &Folder,
     place: &Path,
-    contents: &[(&str, &[u8])],
+    (checkpoint, before): (&Checkpoint, Option<PathBuf>),
     Surroundings {
         config,
         metrics,
         weights,
     }: Surroundings,
 ) -> Result<()> {
-    let manifest = Manifest {
-        format: FORMAT,
-        code: CODE.to_owned(),
-        config,
-        metrics,
-        weights,
-        files: contents
-            .iter()
-            .map(|(name, content)| ((*name).to_owned(), Fingerprint::of(content)))
-            .collect(),
-    };
-    let manifest = serde_json::to_string_pretty(&manifest).expect("hashes can be written") + "\n";
     let temporary = disk::temporary(place);
     let complete = || {
         disk.create_folder(run, &temporary)
             .with_context(|| run.cannot("create", &temporary))?;
-        for (name, content) in contents {
-            disk::write_synced(disk, run, &temporary.join(name), content)?;
+        let mut files = BTreeMap::new();
+        let mut write = |name: &str, content: &[u8]| {
+            files.insert(name.to_owned(), Fingerprint::of(content));
+            disk::write_synced(disk, run, &temporary.join(name), content)
+        };
+        write(TENSORS, &checkpoint.tensors)?;
+        write(COUNTERS, &checkpoint.counters)?;
+        if let Some(best) = &checkpoint.best {
+            write(BEST, best)?;
         }
+        if let Some(own) = &checkpoint.memory {
+            write(MEMORY, &memory::rest(own))?;
+            let mut missing = Vec::new();
+            let held = before.and_then(|before| Some((read_manifest(run, &before).ok()?, before)));
+            for block in memory::whole_blocks(&memory::numbers(own)) {
+                let name = memory::block_name(block);
+                let linked = held.as_ref().and_then(|(manifest, before)| {
+                    let fingerprint = manifest.files.get(&name)?;
+                    let (from, to) = (before.join(&name), temporary.join(&name));
+                    // Where links cannot be made, the block is written.
+                    disk.link(run, &from, &to).ok()?;
+                    Some(fingerprint.clone())
+                });
+                match linked {
+                    Some(fingerprint) => {
+                        files.insert(name, fingerprint);
+                    }
+                    None => missing.push((name, block)),
+                }
+            }
+            for (name, block) in missing {
+                let content = memory::block(own, block);
+                files.insert(name.clone(), Fingerprint::of(&content));
+                disk::write_synced(disk, run, &temporary.join(name), &content)?;
+            }
+        }
+        let manifest = Manifest {
+            format: FORMAT,
+            code: CODE.to_owned(),
+            config: config.clone(),
+            metrics: metrics.clone(),
+            weights: weights.clone(),
+            files,
+        };
+        let manifest = serde_json::to_string_pretty(&manifest).expect("hashes can be written");
+        let manifest = manifest + "\n";
         disk::write_synced(disk, run, &temporary.join(MANIFEST), manifest.as_bytes())?;
         disk::sync_folder(disk, run, &temporary)?;
         disk::rename(disk, run, &temporary, place)
@@ -146,6 +182,15 @@ pub(super) fn remove(disk: &dyn Disk, run: &Folder, number: u64) -> Result<()> {
         .with_context(|| run.cannot("remove", &temporary))
 }
 
+/// How much of a checkpoint is wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Wanted {
+    /// All that a run continues from.
+    Everything,
+    /// The parameters; a replay memory is not looked at.
+    Parameters,
+}
+
 /// The latest checkpoint that is as it was written, if the run has checkpoints, and what is wrong with later ones. Its tensors
 /// are expected to have at most `tensors_max` bytes.
 ///
@@ -154,11 +199,11 @@ pub(super) fn remove(disk: &dyn Disk, run: &Folder, number: u64) -> Result<()> {
 pub(super) fn latest(
     run: &Folder,
     config: &ConfigFile,
-    tensors_max: usize,
+    (wanted, tensors_max): (Wanted, usize),
 ) -> Result<(Option<Stored>, Vec<String>)> {
     let mut wrong = Vec::new();
     for number in numbers(run)?.into_iter().rev() {
-        match read(run, config, number, tensors_max) {
+        match read(run, config, number, (wanted, tensors_max)) {
             Ok(stored) => return Ok((Some(stored), wrong)),
             Err(error) => wrong.push(format!(
                 "{} is damaged: {}",
@@ -199,7 +244,7 @@ pub(super) fn weights_path(number: u64) -> PathBuf {
 
 /// Reads a checkpoint, and compares everything with its manifest. The configuration decides what a checkpoint means; the metrics
 /// only stand beside it, so damage to them costs no checkpoint.
-fn read(run: &Folder, config: &ConfigFile, number: u64, tensors_max: usize) -> Result<Stored> {
+fn read(run: &Folder, config: &ConfigFile, number: u64, wanted: (Wanted, usize)) -> Result<Stored> {
     let place = place(number);
     let manifest = read_manifest(run, &place)?;
     if !config.is(&manifest.config) {
@@ -212,7 +257,7 @@ fn read(run: &Folder, config: &ConfigFile, number: u64, tensors_max: usize) -> R
     };
     Ok(Stored {
         number,
-        checkpoint: read_files(run, &place, &manifest, tensors_max)?,
+        checkpoint: read_files(run, &place, &manifest, wanted)?,
         metrics,
         weights: manifest.weights,
     })
@@ -224,7 +269,12 @@ pub(super) fn read_alone(checkpoint: &Folder) -> Result<Checkpoint> {
     // What the file should hold bounds how much of it is read.
     let expected = manifest.files.get(TENSORS).map_or(0, |file| file.bytes);
     let tensors_max = usize::try_from(expected).unwrap_or(usize::MAX);
-    read_files(checkpoint, Path::new(""), &manifest, tensors_max)
+    read_files(
+        checkpoint,
+        Path::new(""),
+        &manifest,
+        (Wanted::Everything, tensors_max),
+    )
 }
 
 fn read_manifest(folder: &Folder, place: &Path) -> Result<Manifest> {
@@ -249,7 +299,7 @@ fn read_files(
     folder: &Folder,
     place: &Path,
     manifest: &Manifest,
-    tensors_max: usize,
+    (wanted, tensors_max): (Wanted, usize),
 ) -> Result<Checkpoint> {
     let own = |name: &str, length_max| {
         let path = place.join(name);
@@ -260,10 +310,20 @@ fn read_files(
         }
     };
     let has_best = manifest.files.contains_key(BEST);
+    let has_memory = wanted == Wanted::Everything && manifest.files.contains_key(MEMORY);
+    let memory = has_memory.then(|| {
+        // Nothing larger than the files themselves is made of them.
+        let read = |name: &str| {
+            let bytes = manifest.files.get(name).map_or(0, |file| file.bytes);
+            own(name, usize::try_from(bytes).unwrap_or(usize::MAX))
+        };
+        memory::assemble(read, |name| differs(folder, &place.join(name)))
+    });
     Ok(Checkpoint {
         tensors: own(TENSORS, tensors_max)?,
         counters: own(COUNTERS, COUNTERS_MAX)?,
         best: has_best.then(|| own(BEST, tensors_max)).transpose()?,
+        memory: memory.transpose()?,
     })
 }
 

@@ -31,6 +31,8 @@ pub(super) trait Disk: Debug {
     fn sync(&self, file: &File) -> io::Result<()>;
     /// Gives a file or a folder another name, at once.
     fn rename(&self, within: &Folder, from: &Path, to: &Path) -> io::Result<()>;
+    /// Gives a file a second name.
+    fn link(&self, within: &Folder, from: &Path, to: &Path) -> io::Result<()>;
     /// Removes a folder and what is in it.
     fn remove_folder(&self, within: &Folder, path: &Path) -> io::Result<()>;
 }
@@ -59,6 +61,10 @@ impl Disk for RealDisk {
 
     fn rename(&self, within: &Folder, from: &Path, to: &Path) -> io::Result<()> {
         within.dir().rename(from, within.dir(), to)
+    }
+
+    fn link(&self, within: &Folder, from: &Path, to: &Path) -> io::Result<()> {
+        within.dir().hard_link(from, within.dir(), to)
     }
 
     fn remove_folder(&self, within: &Folder, path: &Path) -> io::Result<()> {

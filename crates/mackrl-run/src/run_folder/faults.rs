@@ -80,6 +80,11 @@ impl Disk for FaultyDisk {
         RealDisk.rename(within, from, to)
     }
 
+    fn link(&self, within: &Folder, from: &Path, to: &Path) -> io::Result<()> {
+        self.check()?;
+        RealDisk.link(within, from, to)
+    }
+
     fn remove_folder(&self, within: &Folder, path: &Path) -> io::Result<()> {
         self.check()?;
         RealDisk.remove_folder(within, path)

@@ -4,15 +4,12 @@
 //! at every moment it is a run that can go on anywhere. What a killed process left on this machine's disk is used if it is further than the
 //! shared folder.
 
-use std::{
-    fs, io,
-    path::{Path, PathBuf},
-};
+use std::{fs, io, path::Path};
 
 use cap_std::fs::OpenOptions;
 
 use super::{
-    CHECKPOINTS, CONFIG, LOCK, RUN, WEIGHTS, checkpoints,
+    CHECKPOINTS, CONFIG, KEPT, LOCK, RUN, WEIGHTS, checkpoints,
     claim::{Claim, Occupation},
     disk::{self, Disk, RealDisk},
 };
@@ -119,19 +116,33 @@ fn is_further(one: &Folder, other: &Folder) -> Result<bool> {
     Ok(latest(one)? > latest(other)? && config(one)? == config(other)?)
 }
 
-/// Copies the files of a run with these names, each as a whole.
+/// Copies the files of a run with these names, and the weights that it keeps, each as a whole.
 fn copy_files(from: &Folder, to: &Folder, is_wanted: impl Fn(&str) -> bool) -> Result<()> {
-    for (name, kind) in from.entries("")? {
+    let kept = Path::new(KEPT);
+    if from.kind(kept)?.is_some() {
+        disk::ensure_folder(&RealDisk, to, kept)?;
+        copy_files_in(kept, from, to, |_| true)?;
+    }
+    copy_files_in(Path::new(""), from, to, is_wanted)
+}
+
+fn copy_files_in(
+    inside: &Path,
+    from: &Folder,
+    to: &Folder,
+    is_wanted: impl Fn(&str) -> bool,
+) -> Result<()> {
+    for (name, kind) in from.entries(inside)? {
         let ending = Path::new(&name).extension();
         let is_own = name != LOCK && ending.is_none_or(|ending| ending != disk::TEMPORARY);
         if is_own && kind == Kind::File && is_wanted(&name) {
-            let name = PathBuf::from(name);
+            let name = inside.join(name);
             let temporary = disk::temporary(&name);
             copy(from, &name, to, &temporary)?;
             disk::rename(&RealDisk, to, &temporary, &name)?;
         }
     }
-    disk::sync_folder(&RealDisk, to, Path::new(""))
+    disk::sync_folder(&RealDisk, to, inside)
 }
 
 /// Gives one folder the checkpoints of the other, and no others.
@@ -193,7 +204,7 @@ mod tests {
     use super::*;
     use crate::{
         config::Config,
-        run_folder::{METRICS, Run, RunFolder, Status, read_description},
+        run_folder::{METRICS, Run, RunFolder, Status, WhichWeights, read_description},
         training::Trainer,
     };
 
@@ -247,10 +258,13 @@ mod tests {
         drop(mirror);
         let mirror = Mirror::begin(&home, &scratch).unwrap();
         assert_ne!(numbers(&home), numbers(&scratch));
-        let expected = Run::open(&scratch).unwrap().weights;
+        let expected = Run::open(&scratch, WhichWeights::Last).unwrap().weights;
         mirror.finish().unwrap();
         assert!(!scratch.exists());
-        assert_eq!(Run::open(&home).unwrap().weights, expected);
+        assert_eq!(
+            Run::open(&home, WhichWeights::Last).unwrap().weights,
+            expected
+        );
         assert_eq!(go_on(&home, 1), 6, "nothing is lost");
     }
 

@@ -30,6 +30,7 @@ mod event_file;
 mod kept;
 mod latest;
 mod manifest;
+mod memory;
 mod metrics_file;
 mod mirror;
 mod record;
@@ -190,7 +191,11 @@ impl RunFolder {
             })
             .filter(|versions| *versions != Versions::OWN);
         let tensors_max = tensors_bytes_max(&config.config)?;
-        let (latest, damaged) = checkpoints::latest(&folder, &config, tensors_max)?;
+        let (latest, damaged) = checkpoints::latest(
+            &folder,
+            &config,
+            (checkpoints::Wanted::Everything, tensors_max),
+        )?;
         let number = latest.as_ref().map(|stored| stored.number);
         checkpoints::tidy(&RealDisk, &folder, number)?;
         let known = latest.as_ref().map(|stored| &stored.weights);

@@ -228,7 +228,11 @@ impl Run {
             });
         }
         let length_max = tensors_bytes_max(&run.config.config)?;
-        let (latest, _) = checkpoints::latest(&run.folder, &run.config, length_max)?;
+        let (latest, _) = checkpoints::latest(
+            &run.folder,
+            &run.config,
+            (checkpoints::Wanted::Parameters, length_max),
+        )?;
         let stored = latest.ok_or_else(|| RunError::BadData {
             message: format!(
                 "{} has no {WEIGHTS} and no checkpoint: the run has only begun",

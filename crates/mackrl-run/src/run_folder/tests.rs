@@ -142,3 +142,63 @@ fn a_checkpoint_that_leads_elsewhere_is_refused() {
     );
     assert!(elsewhere.join("000000000007.tmp").exists());
 }
+
+/// A memory of the episodes with these numbers.
+fn memory(numbers: std::ops::Range<u64>) -> mackrl::experience::MemoryState {
+    mackrl::experience::MemoryState {
+        first: numbers.start,
+        episodes: numbers
+            .map(|number| number.to_le_bytes().as_slice().into())
+            .collect(),
+    }
+}
+
+#[test]
+fn remembered_episodes_are_written_once_and_gone_when_the_run_is_over() {
+    let parent = tempfile::tempdir().unwrap();
+    let path = free_path(&parent);
+    let mut folder = RunFolder::create(&path, &Config::default(), 1).unwrap();
+    let checkpoint = |memory| Checkpoint {
+        tensors: vec![1; 100],
+        counters: b"{}".to_vec(),
+        best: None,
+        memory,
+    };
+    let first = checkpoint(Some(memory(0..300)));
+    let second = checkpoint(Some(memory(120..500)));
+    folder.write_checkpoint(1, &first).unwrap();
+    folder.write_checkpoint(2, &second).unwrap();
+    let files = |number: usize| {
+        let folder = path.join(CHECKPOINTS).join(format!("{number:012}"));
+        let names = fs::read_dir(folder).unwrap();
+        let mut names: Vec<_> = names.map(|entry| entry.unwrap().path()).collect();
+        names.retain(|name| name.to_string_lossy().contains("memory-"));
+        names.sort();
+        names
+    };
+    assert_eq!([files(1).len(), files(2).len()], [2, 2]);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        let file = |path: &Path| fs::metadata(path).unwrap().ino();
+        assert_eq!(file(&files(1)[1]), file(&files(2)[0]), "block 1 is linked");
+    }
+    drop(folder);
+    let Resumption {
+        mut folder,
+        checkpoint: found,
+        damaged,
+        ..
+    } = RunFolder::resume(&path, 1).unwrap();
+    assert!(found.as_ref() == Some(&second) && damaged.is_empty());
+    // An earlier block that is damaged costs the checkpoints that have it, and is told.
+    fs::write(&files(2)[1], b"other").unwrap();
+    drop(folder);
+    let resumption = RunFolder::resume(&path, 1).unwrap();
+    assert!(resumption.checkpoint == Some(first));
+    assert!(resumption.damaged[0].contains("memory-000000000002.episodes"));
+    folder = resumption.folder;
+    folder.write_checkpoint(3, &checkpoint(None)).unwrap();
+    let left = fs::read_dir(path.join(CHECKPOINTS)).unwrap();
+    assert_eq!(left.count(), 1, "the last checkpoint needs no memory");
+}

@@ -266,7 +266,12 @@ impl Trainer {
             interval: self.interval.tally.clone(),
             best: self.best.as_ref().map(|best| best.test),
         };
-        Checkpoint::write(&self.algorithm.state(), &counters, self.best.as_ref())
+        let mut state = self.algorithm.state();
+        if self.finished() {
+            // It is large, and nothing is learnt any more.
+            state.memory = None;
+        }
+        Checkpoint::write(&state, &counters, self.best.as_ref())
     }
 
     /// Continues where `checkpoint` was taken: what follows is the same to the byte as if there had been no interruption.
@@ -276,7 +281,8 @@ impl Trainer {
     pub fn restore(&mut self, checkpoint: &Checkpoint) -> Result<(), Error> {
         let statistics = &self.world.spec().statistics;
         let own = &*self.algorithm;
-        let opened = checkpoint.open(|name| is_explained(name, own, statistics))?;
+        let mut opened = checkpoint.open(|name| is_explained(name, own, statistics))?;
+        opened.is_last = opened.trainer.steps_env >= self.config.run.steps_env;
         self.algorithm.restore(&opened)?;
         self.best = opened.best;
         let counters = opened.trainer;

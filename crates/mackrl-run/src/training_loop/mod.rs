@@ -223,6 +223,7 @@ impl Snapshot {
             tensors,
             counters,
             best,
+            ..
         } = &self.checkpoint;
         let best = best.as_ref().map_or(0, Vec::len);
         if tensors.len() + counters.len() + best > QUICKLY_WRITTEN {

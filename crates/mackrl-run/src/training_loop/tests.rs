@@ -65,6 +65,7 @@ impl Training for Counting {
             tensors: vec![5],
             counters: self.updates.to_le_bytes().to_vec(),
             best: Some(vec![3]),
+            memory: None,
         }
     }
 

@@ -6,9 +6,13 @@
 
 mod actor_critic;
 mod central_v;
+mod iql;
 mod mackrl;
 mod ppo;
+mod q_learning;
+mod qmix;
 mod state;
+mod vdn;
 
 use std::{fmt::Debug, sync::Arc};
 
@@ -19,11 +23,15 @@ use mackrl_env::{
 
 pub use actor_critic::{ActorCritic, ActorCriticSettings, OptimiserName};
 pub use central_v::CentralV;
+pub use iql::{Iql, Unmixed};
 pub use mackrl::{Levels, Mackrl, MackrlSettings, PartitionChoice};
 pub use ppo::{
     Groups, Ippo, MackrlPpo, MackrlPpoSettings, Mappo, PairMemory, Ppo, PpoSettings, Sight,
 };
+pub use q_learning::{ActionValues, QLearner, QLearningSettings};
+pub use qmix::{Qmix, QmixSettings};
 pub use state::{AlgorithmState, StoredState};
+pub use vdn::{Summed, Vdn};
 
 use crate::{
     Error, Stopwatch,
@@ -64,7 +72,7 @@ pub trait Algorithm: Send + Debug {
         stopwatch: &mut Stopwatch,
     ) -> Result<Tally, Error>;
 
-    /// Policy updates so far.
+    /// Batches learnt from so far: policy updates, but for learners that only remember the first batches.
     fn updates(&self) -> u64;
 
     /// Names (or the parts before a number) and meanings of what [`learn`](Self::learn) and the policy's actors report.
@@ -188,6 +196,9 @@ pub fn built_in() -> Vec<Arc<dyn AlgorithmKind>> {
         Arc::new(MackrlPpo),
         Arc::new(Mappo::default()),
         Arc::new(Ippo::default()),
+        Arc::new(Iql),
+        Arc::new(Vdn),
+        Arc::new(Qmix),
     ]
 }
 

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::{
     Error,
+    experience::MemoryState,
     nn::{Moments, OptimiserKind, ParameterLayout},
 };
 
@@ -14,6 +15,8 @@ pub struct AlgorithmState {
     pub tensors: Vec<(ParameterLayout, Vec<f32>)>,
     /// Counts, each at most 2⁵³.
     pub counters: BTreeMap<String, u64>,
+    /// What a replay memory holds, if there is one.
+    pub memory: Option<MemoryState>,
 }
 
 /// A state that was stored.
@@ -29,6 +32,14 @@ pub trait StoredState {
     /// # Errors
     /// [`Error::Data`] if it is missing.
     fn counter(&self, name: &str) -> Result<u64, Error>;
+
+    /// What a replay memory held.
+    ///
+    /// # Errors
+    /// [`Error::Data`] if it is missing.
+    fn memory(&self) -> Result<MemoryState, Error> {
+        Err(Error::Data("no replay memory was stored".to_owned()))
+    }
 }
 
 impl AlgorithmState {

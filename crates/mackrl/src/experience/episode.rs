@@ -1,6 +1,6 @@
 //! One episode of one environment.
 
-use mackrl_env::{Action, EntitySet, EpisodeEnd, Observations};
+use mackrl_env::{Action, AgentId, EntitySet, EpisodeEnd, Observations};
 
 use crate::policy::Recording;
 
@@ -9,6 +9,11 @@ use crate::policy::Recording;
 pub struct Episode {
     /// States \[T + 1, G\]: before each step, and after the last; empty unless recorded for learning.
     pub state_tg: Vec<f32>,
+    /// What each agent observes \[T + 1, N, O\]: before each step, and after the last; empty unless recorded for a learner that asks
+    /// for it ([`Actor::needs_views`](crate::policy::Actor::needs_views)).
+    pub observation_tno: Vec<f32>,
+    /// Which actions each agent has \[T + 1, N, A\], as `observation_tno`.
+    pub available_tna: Vec<bool>,
     /// Joint actions \[T, N\]; empty unless recorded for learning.
     pub action_tn: Vec<Action>,
     /// Agents that live before each step \[T\]; empty unless recorded for learning.
@@ -60,6 +65,8 @@ impl Episode {
     /// Forgets everything but the memory.
     pub(super) fn clear(&mut self) {
         self.state_tg.clear();
+        self.observation_tno.clear();
+        self.available_tna.clear();
         self.action_tn.clear();
         self.alive_t.clear();
         self.log_p_t.clear();
@@ -68,15 +75,24 @@ impl Episode {
         self.statistics_s.clear();
     }
 
-    /// Appends the state of environment `b`, if it will be needed.
-    pub(super) fn remember_state(
+    /// Appends what environment `b` shows, as far as it will be needed: the state, and the `agents` local views if `needs_views`.
+    pub(super) fn remember(
         &mut self,
         recording: Recording,
-        observations: &Observations,
-        b: usize,
+        (observations, b): (&Observations, usize),
+        agents: usize,
+        needs_views: bool,
     ) {
-        if recording == Recording::ForLearning {
-            self.state_tg.extend_from_slice(observations.state(b));
+        if recording == Recording::Off {
+            return;
+        }
+        self.state_tg.extend_from_slice(observations.state(b));
+        if needs_views {
+            for agent in (0..agents).map(AgentId::new) {
+                let view = observations.local_view(b, agent);
+                self.observation_tno.extend_from_slice(view.observation());
+                self.available_tna.extend_from_slice(view.available());
+            }
         }
     }
 }

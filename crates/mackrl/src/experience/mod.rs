@@ -11,6 +11,7 @@
 
 mod collector;
 mod episode;
+mod memory;
 mod rows;
 mod shard;
 
@@ -18,6 +19,7 @@ use mackrl_env::EpisodeKey;
 
 pub use collector::Collector;
 pub use episode::Episode;
+pub use memory::{EpisodeShape, MemoryState, RememberedEpisode, ReplayMemory};
 pub use rows::{Instance, Rows, StepRows};
 pub(crate) use shard::ATTEMPTS_MAX;
 pub use shard::{Piece, Shard};

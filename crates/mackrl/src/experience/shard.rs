@@ -133,7 +133,8 @@ impl Shard {
             self.environments[b].reset(*key, &mut self.observations.row_mut(b));
             check_finite(&self.observations, b, 0)?;
             let episode = &mut experience.episodes[b];
-            episode.remember_state(settings.recording, &self.observations, b);
+            let shown = (&self.observations, b);
+            episode.remember(settings.recording, shown, self.agents, actor.needs_views());
         }
         actor.stopwatch().lap(Phase::Simulate);
         let mut playing: Vec<usize> = (0..keys.len()).collect();
@@ -171,13 +172,15 @@ impl Shard {
             return Err(NotFinite::new("reward", &place, time_step.reward).into());
         }
         check_finite(&self.observations, b, step + 1)?;
+        let needs_views = self.piece.actor.needs_views();
         let episode = &mut self.piece.experience.episodes[b];
         if settings.recording == Recording::ForLearning {
             episode.action_tn.extend_from_slice(actions);
         }
         episode.reward_t.push(time_step.reward);
         episode.end = time_step.end;
-        episode.remember_state(settings.recording, &self.observations, b);
+        let shown = (&self.observations, b);
+        episode.remember(settings.recording, shown, self.agents, needs_views);
         if time_step.end.is_some() {
             let environment = &self.environments[b];
             let count = environment.spec().statistics.len();

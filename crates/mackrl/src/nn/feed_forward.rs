@@ -1,4 +1,4 @@
-//! The feed-forward network of the critics: Linear + `ReLU`, Linear.
+//! The feed-forward networks of critics and mixers: affine layers with `ReLU` between them.
 
 use mackrl_env::EpisodeKey;
 
@@ -13,70 +13,76 @@ use crate::{
     },
 };
 
-/// Linear + `ReLU`, Linear; as places in a flat parameter vector.
+/// Affine layers with `ReLU` between them; as places in a flat parameter vector.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FeedForward {
-    input: Linear,
-    output: Linear,
+    layers: Vec<Linear>,
 }
 
 /// The weights of a [`FeedForward`] as its kernels read them: copied from the flat vector once per update.
 #[derive(Debug, Clone)]
 pub struct FeedForwardWeights<R> {
-    input: LinearWeights<R>,
-    output: LinearWeights<R>,
+    layers: Vec<LinearWeights<R>>,
 }
 
 /// The activations of a [`FeedForward`] for one batch of rows; the caller's, and used from batch to batch.
 #[derive(Debug, Clone)]
 pub struct FeedForwardTrace<R> {
-    pub(crate) sizes: NetworkSizes,
-    pub(crate) rows: usize,
-    pub(crate) inputs: Aligned<R>,
-    pub(crate) features: Aligned<R>,
-    features_gradient: Aligned<R>,
-    pub(crate) outputs: Aligned<R>,
-    outputs_gradient: Aligned<R>,
+    widths: Vec<usize>,
+    rows: usize,
+    /// The inputs, and what each layer gives, rectified.
+    values: Vec<Aligned<R>>,
+    /// Their gradients; that of the inputs is never computed.
+    gradients: Vec<Aligned<R>>,
     scratch: Aligned<R>,
 }
 
 impl FeedForward {
-    /// Adds the tensors of `{name}.input` and `{name}.output` to a layout.
+    /// Linear + `ReLU`, Linear: adds the tensors of `{name}.input` and `{name}.output` to a layout.
     pub fn new(layout: &mut ParameterLayout, name: &str, sizes: NetworkSizes) -> Self {
-        let NetworkSizes {
-            inputs,
-            hidden,
-            outputs,
-        } = sizes;
+        Self::with_widths(layout, name, &widths(sizes))
+    }
+
+    /// As many layers as there are `widths`, less one: rows of `widths[0]` numbers become rows of `widths[1]`, and so on. Adds the
+    /// tensors of a single layer under `name`, those of several under `{name}.input`, `{name}.inner` and `{name}.output`.
+    ///
+    /// # Panics
+    /// If there are not one to three layers.
+    pub fn with_widths(layout: &mut ParameterLayout, name: &str, widths: &[usize]) -> Self {
+        let parts: &[&str] = match widths.len() {
+            2 => &[""],
+            3 => &[".input", ".output"],
+            4 => &[".input", ".inner", ".output"],
+            count => panic!("{count} widths, expected 2 to 4"),
+        };
+        let pairs = widths.windows(2).zip(parts);
+        let layers = pairs.map(|(widths, part)| {
+            Linear::new(layout, &format!("{name}{part}"), widths[0], widths[1])
+        });
         Self {
-            input: Linear::new(layout, &format!("{name}.input"), inputs, hidden),
-            output: Linear::new(layout, &format!("{name}.output"), hidden, outputs),
+            layers: layers.collect(),
         }
     }
 
-    /// The sizes it was made with.
-    #[must_use]
-    pub const fn sizes(&self) -> NetworkSizes {
-        NetworkSizes {
-            inputs: self.input.inputs,
-            hidden: self.input.outputs,
-            outputs: self.output.outputs,
-        }
+    /// Length of a row of inputs, and of what each layer gives.
+    fn widths(&self) -> impl Iterator<Item = usize> {
+        let outputs = self.layers.iter().map(|layer| layer.outputs);
+        std::iter::once(self.layers[0].inputs).chain(outputs)
     }
 
     /// Draws initial parameters as PyTorch does; see
     /// [`RecurrentNetwork::initialise`](crate::nn::RecurrentNetwork::initialise).
     pub fn initialise<R: Real>(&self, key: &EpisodeKey, parameters: &mut [R]) {
-        self.input.initialise(key, parameters);
-        self.output.initialise(key, parameters);
+        let layers = self.layers.iter();
+        layers.for_each(|layer| layer.initialise(key, parameters));
     }
 
     /// Prepares the weights for [`forward`](Self::forward) and [`backward`](Self::backward).
     #[must_use]
     pub fn weights<E: Element>(&self, parameters: &[E]) -> FeedForwardWeights<E> {
+        let layers = self.layers.iter().map(|_| LinearWeights::default());
         let mut weights = FeedForwardWeights {
-            input: LinearWeights::default(),
-            output: LinearWeights::default(),
+            layers: layers.collect(),
         };
         self.refresh(parameters, &mut weights);
         weights
@@ -84,10 +90,12 @@ impl FeedForward {
 
     /// Brings prepared weights up to date after an update, without allocating.
     pub fn refresh<E: Element>(&self, parameters: &[E], weights: &mut FeedForwardWeights<E>) {
-        self.input.refresh_forward(parameters, &mut weights.input);
-        self.output.refresh_forward(parameters, &mut weights.output);
-        self.output
-            .refresh_backward(parameters, &mut weights.output);
+        for (place, (layer, own)) in self.layers.iter().zip(&mut weights.layers).enumerate() {
+            layer.refresh_forward(parameters, own);
+            if place > 0 {
+                layer.refresh_backward(parameters, own);
+            }
+        }
     }
 
     /// Computes the outputs of all rows of a trace.
@@ -99,18 +107,18 @@ impl FeedForward {
         weights: &FeedForwardWeights<E>,
         trace: &mut FeedForwardTrace<E>,
     ) {
-        assert_eq!(trace.sizes, self.sizes(), "sizes of the trace");
+        self.expect_sizes(trace);
         let rows = trace.rows;
-        let features = &mut trace.features.as_mut_slice()[..rows * trace.sizes.hidden];
-        self.input
-            .forward(&weights.input, rows, trace.inputs.as_slice(), features);
-        E::dispatch(Rectify { values: features });
-        self.output.forward(
-            &weights.output,
-            rows,
-            features,
-            trace.outputs.as_mut_slice(),
-        );
+        let layers = self.layers.iter().zip(&weights.layers).enumerate();
+        for (place, (layer, own)) in layers {
+            let (before, after) = trace.values.split_at_mut(place + 1);
+            let (x, y) = (before[place].as_slice(), after[0].as_mut_slice());
+            layer.forward(own, rows, x, y);
+            if place + 1 < self.layers.len() {
+                let values = &mut y[..rows * layer.outputs];
+                E::dispatch(Rectify { values });
+            }
+        }
     }
 
     /// Adds the parameters' gradients to the flat `gradient`, from the gradients of the outputs.
@@ -123,22 +131,28 @@ impl FeedForward {
         trace: &mut FeedForwardTrace<E>,
         gradient: &mut [E],
     ) {
-        assert_eq!(trace.sizes, self.sizes(), "sizes of the trace");
+        self.expect_sizes(trace);
         let rows = trace.rows;
-        let features = &trace.features.as_slice()[..rows * trace.sizes.hidden];
-        let dy = trace.outputs_gradient.as_slice();
-        let dx = &mut trace.features_gradient.as_mut_slice()[..rows * trace.sizes.hidden];
-        let scratch = &mut trace.scratch;
-        self.output
-            .parameter_gradient(rows, features, dy, gradient, scratch);
-        dx.fill(E::ZERO);
-        self.output.input_gradient(&weights.output, rows, dy, dx);
-        E::dispatch(RectifyGradient {
-            values: features,
-            gradient: &mut *dx,
-        });
-        self.input
-            .parameter_gradient(rows, trace.inputs.as_slice(), dx, gradient, scratch);
+        for (place, layer) in self.layers.iter().enumerate().rev() {
+            let (before, after) = trace.gradients.split_at_mut(place + 1);
+            let x = &trace.values[place].as_slice()[..rows * layer.inputs];
+            let dy = after[0].as_slice();
+            layer.parameter_gradient(rows, x, dy, gradient, &mut trace.scratch);
+            if place > 0 {
+                let dx = &mut before[place].as_mut_slice()[..rows * layer.inputs];
+                dx.fill(E::ZERO);
+                layer.input_gradient(&weights.layers[place], rows, dy, dx);
+                E::dispatch(RectifyGradient {
+                    values: x,
+                    gradient: dx,
+                });
+            }
+        }
+    }
+
+    fn expect_sizes<R>(&self, trace: &FeedForwardTrace<R>) {
+        let found = trace.widths.iter().copied();
+        assert!(self.widths().eq(found), "sizes of the trace");
     }
 }
 
@@ -146,32 +160,37 @@ impl<R: Real> FeedForwardTrace<R> {
     /// An empty trace for networks of these sizes.
     #[must_use]
     pub fn new(sizes: NetworkSizes) -> Self {
+        Self::with_widths(widths(sizes).to_vec())
+    }
+
+    /// An empty trace for `network`.
+    #[must_use]
+    pub fn of(network: &FeedForward) -> Self {
+        Self::with_widths(network.widths().collect())
+    }
+
+    fn with_widths(widths: Vec<usize>) -> Self {
+        let buffers = || widths.iter().map(|_| Aligned::default()).collect();
         Self {
-            sizes,
             rows: 0,
-            inputs: Aligned::default(),
-            features: Aligned::default(),
-            features_gradient: Aligned::default(),
-            outputs: Aligned::default(),
-            outputs_gradient: Aligned::default(),
+            values: buffers(),
+            gradients: buffers(),
             scratch: Aligned::default(),
+            widths,
         }
     }
 
     /// Begins a batch of `rows` rows whose inputs are all zero, and returns them [rows, inputs].
     pub fn begin(&mut self, rows: usize) -> &mut [R] {
-        let NetworkSizes {
-            inputs,
-            hidden,
-            outputs,
-        } = self.sizes;
         self.rows = rows;
-        self.inputs.grow(rows * inputs);
-        self.features.grow(rows * hidden);
-        self.features_gradient.grow(rows * hidden);
-        self.outputs.grow(rows * outputs);
-        self.outputs_gradient.grow(rows * outputs);
-        let x = &mut self.inputs.as_mut_slice()[..rows * inputs];
+        let buffers = self.values.iter_mut().zip(&mut self.gradients);
+        for (place, ((values, gradients), width)) in buffers.zip(&self.widths).enumerate() {
+            values.grow(rows * width);
+            if place > 0 {
+                gradients.grow(rows * width);
+            }
+        }
+        let x = &mut self.values[0].as_mut_slice()[..rows * self.widths[0]];
         x.fill(R::ZERO);
         x
     }
@@ -179,16 +198,22 @@ impl<R: Real> FeedForwardTrace<R> {
     /// The outputs [rows, outputs].
     #[must_use]
     pub fn outputs(&self) -> &[R] {
-        &self.outputs.as_slice()[..self.rows * self.sizes.outputs]
+        let last = self.widths.len() - 1;
+        &self.values[last].as_slice()[..self.rows * self.widths[last]]
     }
 
     /// The outputs, and the place for their gradient [rows, outputs], which holds numbers of earlier batches: write every
     /// element before the backward pass.
     pub fn outputs_and_gradient_mut(&mut self) -> (&[R], &mut [R]) {
-        let length = self.rows * self.sizes.outputs;
+        let last = self.widths.len() - 1;
+        let length = self.rows * self.widths[last];
         (
-            &self.outputs.as_slice()[..length],
-            &mut self.outputs_gradient.as_mut_slice()[..length],
+            &self.values[last].as_slice()[..length],
+            &mut self.gradients[last].as_mut_slice()[..length],
         )
     }
+}
+
+const fn widths(sizes: NetworkSizes) -> [usize; 3] {
+    [sizes.inputs, sizes.hidden, sizes.outputs]
 }

@@ -18,6 +18,7 @@
 mod aligned;
 pub mod benchmark;
 pub(crate) mod elementary;
+mod elementwise;
 mod feed_forward;
 mod finite;
 mod gates;
@@ -40,6 +41,7 @@ mod values;
 mod weight_gradient;
 
 pub(crate) use elementary::logarithms;
+pub(crate) use elementwise::{absolute, absolute_gradient, elu, elu_gradient};
 pub use feed_forward::{FeedForward, FeedForwardTrace, FeedForwardWeights};
 pub use finite::first_not_finite;
 pub use gru::Gru;

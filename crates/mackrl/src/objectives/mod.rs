@@ -10,6 +10,7 @@ mod clipped_surrogate;
 mod entropy_regularised;
 mod policy_gradient;
 mod returns;
+mod temporal_difference;
 mod value_loss;
 
 pub use average::LossAverage;
@@ -17,4 +18,5 @@ pub use clipped_surrogate::{Surrogate, clipped_surrogate};
 pub use entropy_regularised::entropy_regularised;
 pub use policy_gradient::policy_gradient;
 pub use returns::{ReturnSettings, generalised_advantages, lambda_returns};
+pub use temporal_difference::{ValueErrors, squared_errors};
 pub use value_loss::ValueLoss;

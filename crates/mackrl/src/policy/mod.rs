@@ -164,6 +164,12 @@ pub trait Actor: Send {
         actions_bn: &mut [Action],
     ) -> Result<(), NotFinite>;
 
+    /// Whether what it leaves is learnt from by what each agent observed, the observations after the last step included, so that
+    /// episodes recorded for learning have to hold it.
+    fn needs_views(&self) -> bool {
+        false
+    }
+
     /// Adds what was seen since [`Self::begin`] (entropies, delegation, …) to `tally`.
     fn report(&self, tally: &mut Tally) {
         let _ = tally;

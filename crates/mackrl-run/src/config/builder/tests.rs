@@ -86,8 +86,8 @@ fn a_wrong_type_is_named_with_its_place_and_what_was_expected() {
         "run.toml:1:13: `algorithm` is 3, expected a table of settings"
     );
     assert_eq!(
-        message(file("[algorithm]\nname = \"qmix\"\n")),
-        "run.toml:2:8: `algorithm.name` is \"qmix\", expected `mackrl`, `central-v`, `mackrl-ppo`, `mappo` or `ippo`"
+        message(file("[algorithm]\nname = \"maddpg\"\n")),
+        "run.toml:2:8: `algorithm.name` is \"maddpg\", expected `mackrl`, `central-v`, `mackrl-ppo`, `mappo`, `ippo`, `iql`, `vdn` or `qmix`"
     );
     assert_eq!(
         message(builder().set("run.seed=-1")),
@@ -134,7 +134,7 @@ fn a_short_flag_is_named_as_it_was_typed() {
 fn a_preset_that_is_not_shipped_names_its_neighbour() {
     assert_eq!(
         message(builder().preset("papers")),
-        "unknown preset `papers`, expected default, fours, paper, paper-code, paper-figures, did you mean `paper`?"
+        "unknown preset `papers`, expected default, fours, paper, paper-code, paper-figures, pymarl-iql, pymarl-vdn, pymarl-qmix, pymarl2-qmix, pymarl-coma, did you mean `paper`?"
     );
 }
 

@@ -10,12 +10,15 @@
 //! | `target.NAME` | the same parameter of the target critic |
 //! | `opt.adam.m.NAME`, `opt.adam.v.NAME` | Adam's averages of gradients and of their squares |
 //! | `opt.rmsprop.v.NAME` | `RMSprop`'s averages of squared gradients |
+//!
+//! Learners that remember episodes have a replay memory beside them, whose episodes are encoded by `mackrl::experience`.
 
 use std::collections::BTreeMap;
 
 use mackrl::{
     Error,
     algorithms::{AlgorithmState, StoredState},
+    experience::MemoryState,
     nn::ParameterLayout,
     policy::Tally,
 };
@@ -41,6 +44,8 @@ pub struct Checkpoint {
     pub counters: Vec<u8>,
     /// The weights that did best in a test so far, as a file that describes itself.
     pub best: Option<Vec<u8>>,
+    /// What a replay memory holds, if the algorithm has one and the run goes on.
+    pub memory: Option<MemoryState>,
 }
 
 /// The trainer's own part.
@@ -80,6 +85,9 @@ struct Numbers {
 #[derive(Debug)]
 pub(super) struct Opened<'a> {
     tensors: &'a [u8],
+    memory: Option<&'a MemoryState>,
+    /// Whether the run ended here, and needs no replay memory any more.
+    pub(super) is_last: bool,
     algorithm: BTreeMap<String, u64>,
     pub(super) trainer: Counters,
     pub(super) best: Option<Best>,
@@ -93,6 +101,17 @@ impl StoredState for Opened<'_> {
     fn counter(&self, name: &str) -> Result<u64, Error> {
         let count = self.algorithm.get(name).copied();
         count.ok_or_else(|| Error::Data(format!("checkpoint has no count `{name}`")))
+    }
+
+    fn memory(&self) -> Result<MemoryState, Error> {
+        match self.memory {
+            Some(memory) => Ok(memory.clone()),
+            None if self.is_last => Ok(MemoryState {
+                first: self.trainer.episodes,
+                episodes: Vec::new(),
+            }),
+            None => Err(Error::Data("checkpoint has no replay memory".to_owned())),
+        }
     }
 }
 
@@ -124,6 +143,7 @@ impl Checkpoint {
             tensors: write_weights(&models),
             counters: json,
             best: best.map(|best| best.weights.clone()),
+            memory: algorithm.memory.clone(),
         }
     }
 
@@ -145,6 +165,8 @@ impl Checkpoint {
         };
         Ok(Opened {
             tensors: &self.tensors,
+            memory: self.memory.as_ref(),
+            is_last: false,
             algorithm: numbers.algorithm,
             trainer: numbers.trainer,
             best,

@@ -1,0 +1,155 @@
+//! The settings of every learner of action values.
+
+use mackrl_env::{
+    declare_settings,
+    settings::{Accepts, EXACT, SettingsError, WrongSetting},
+};
+
+use crate::{algorithms::OptimiserName, nn::OptimiserKind, objectives::ReturnSettings};
+
+declare_settings! {
+    /// Sizes of the networks, how training explores (ε-greedy, with ε falling linearly), and how action values are learnt from
+    /// remembered episodes.
+    pub struct QLearningSettings {
+        /// Units in each hidden layer and each recurrent state of the agents.
+        hidden: usize = 64, Accepts::integer(1, 4096);
+        /// ε, the probability of any available action instead of the best, at the first environment step.
+        exploration_start: f64 = 1.0, Accepts::within(0.0, 1.0);
+        /// ε from `algorithm.exploration_steps_env` on; at most `algorithm.exploration_start`.
+        exploration_finish: f64 = 0.05, Accepts::within(0.0, 1.0);
+        /// Environment steps, summed over the parallel environments, over which ε falls.
+        exploration_steps_env: u64 = 50_000, Accepts::integer(1, EXACT);
+        /// Episodes that are remembered; the oldest is forgotten for the next.
+        memory_episodes: usize = 5000, Accepts::integer(1, 1_000_000);
+        /// Episodes of a minibatch, drawn from the memory; learning begins when it holds as many.
+        minibatch_episodes: usize = 32, Accepts::integer(1, 4096);
+        /// Minibatches, with an optimiser step each, after every batch of new episodes.
+        minibatches: u64 = 1, Accepts::integer(1, 1000);
+        /// Episodes between two refreshments of the target networks.
+        target_interval_episodes: u64 = 200, Accepts::integer(1, EXACT);
+        /// Whether the next action is the best by the present networks, and only its value the target networks'; otherwise both are
+        /// the target networks'.
+        double_q: bool = true, Accepts::Flag;
+        /// How parameters follow the gradient.
+        optimiser: OptimiserName = OptimiserName::Rmsprop, OptimiserName::ACCEPTS;
+        /// What is added to the root of the mean squared gradient before a step is divided by it.
+        optimiser_epsilon: f64 = 1e-5, Accepts::above_within(0.0, 1.0);
+        /// Of `rmsprop`: how much of the mean squared gradient is kept at a step. The larger, the longer its memory.
+        rmsprop_smoothing: f64 = 0.99, Accepts::within(0.0, 0.999_999);
+        /// Step size.
+        learning_rate: f64 = 5e-4, Accepts::above_within(0.0, 1.0);
+        /// Discount γ of one environment step.
+        gamma: f64 = 0.99, Accepts::within(0.0, 1.0);
+        /// λ of the targets: 0 looks one step ahead, 1 to the end of the episode as it was played.
+        lambda: f64 = 0.0, Accepts::within(0.0, 1.0);
+        /// Longest gradient (Euclidean norm over all parameters); longer ones are shortened.
+        gradient_norm_max: f64 = 10.0, Accepts::above(0.0);
+        /// Environments that run side by side; each gives one episode to a batch.
+        environments: usize = 1, Accepts::integer(1, 4096);
+        /// Pieces into which a minibatch is cut for work in parallel, and the environments as far as there are as many; as many threads
+        /// as this can be used. It decides the last bits of a result, which the number of threads does not.
+        shards: usize = 2, Accepts::integer(1, 4096);
+        /// Whether the state at a time limit keeps its value; otherwise time running out counts as the end of the game.
+        bootstrap_at_time_limit: bool = true, Accepts::Flag;
+    }
+}
+
+impl QLearningSettings {
+    /// How parameters follow the gradient.
+    #[must_use]
+    pub const fn optimiser(&self) -> OptimiserKind {
+        match self.optimiser {
+            OptimiserName::Adam => OptimiserKind::Adam {
+                beta1: 0.9,
+                beta2: 0.999,
+                epsilon: self.optimiser_epsilon,
+            },
+            OptimiserName::Rmsprop => OptimiserKind::RmsProp {
+                smoothing: self.rmsprop_smoothing,
+                epsilon: self.optimiser_epsilon,
+            },
+        }
+    }
+
+    /// ε after so many environment steps: it falls linearly.
+    #[must_use]
+    pub fn exploration(&self, steps_env: u64) -> f64 {
+        let progress = (steps_env as f64 / self.exploration_steps_env as f64).min(1.0);
+        self.exploration_start + (self.exploration_finish - self.exploration_start) * progress
+    }
+
+    /// How far targets look.
+    pub(super) const fn returns(&self) -> ReturnSettings {
+        ReturnSettings {
+            gamma: self.gamma,
+            lambda: self.lambda,
+        }
+    }
+
+    /// Checks what the range of a single setting does not say: exploration falls, and a minibatch fits into the memory.
+    ///
+    /// # Errors
+    /// [`SettingsError::AtOdds`] if not.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        let (start, finish) = (self.exploration_start, self.exploration_finish);
+        if finish > start {
+            return Err(at_odds(
+                ("exploration_finish", format!("{finish:?}")),
+                ("exploration_start", format!("{start:?}")),
+            ));
+        }
+        let (drawn, kept) = (self.minibatch_episodes, self.memory_episodes);
+        if drawn > kept {
+            return Err(at_odds(
+                ("minibatch_episodes", drawn.to_string()),
+                ("memory_episodes", kept.to_string()),
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// That the first setting is larger than the second.
+fn at_odds((larger, found): (&str, String), (smaller, other): (&str, String)) -> SettingsError {
+    let wrong = |name: &str, found: &str, expected| WrongSetting {
+        name: name.to_owned(),
+        found: found.to_owned(),
+        expected,
+        nearest: None,
+    };
+    let most = format!("at most {other}, which is algorithm.{smaller}");
+    let least = format!("at least {found}, which is algorithm.{larger}");
+    SettingsError::AtOdds(Box::new([
+        wrong(larger, &found, most),
+        wrong(smaller, &other, least),
+    ]))
+}
+
+#[cfg(test)]
+mod tests {
+    use mackrl_env::settings::Settings;
+
+    use super::*;
+
+    #[test]
+    fn exploration_falls_linearly_and_then_stays() {
+        let settings = QLearningSettings::default();
+        for (steps, expected) in [(0, 1.0), (25_000, 0.525), (50_000, 0.05), (1_000_000, 0.05)] {
+            let found = settings.exploration(steps);
+            assert!((found - expected).abs() < 1e-12, "{steps}: {found}");
+        }
+    }
+
+    #[test]
+    fn settings_that_do_not_go_together_are_refused() {
+        let error = |text: &str| {
+            let table = toml::from_str(text).unwrap();
+            let settings = QLearningSettings::read(&table).unwrap();
+            settings.check().unwrap_err().to_string()
+        };
+        let rising = error("exploration_start = 0.01");
+        assert!(rising.contains("at most 0.01"), "{rising}");
+        let larger = error("memory_episodes = 31");
+        assert!(larger.contains("at most 31"), "{larger}");
+    }
+}
