@@ -5,10 +5,12 @@
 //! so it takes nothing away from decentralised execution.
 
 mod central;
+mod members;
 mod mixers;
 mod team;
 
 pub use central::{CentralCritic, CriticMinibatch, CriticReport, CriticSettings, CriticState};
+pub use members::{MemberCritic, MemberCriticSettings, MemberRows};
 pub use mixers::{Mixer, Monotonic, MonotonicSizes, MonotonicTrace, MonotonicWeights};
 pub use team::{ReturnScale, TeamCritic, TeamCriticSettings, ValueInputs};
 
