@@ -16,6 +16,9 @@ const COSTLY: &[(&str, u64)] = &[
     ("algorithm.critic_hidden", 5),
     ("algorithm.epochs", 3),
     ("algorithm.environments", 3),
+    ("algorithm.mixing_hidden", 5),
+    ("algorithm.hypernetwork_hidden", 5),
+    ("algorithm.minibatches", 3),
     ("test.episodes", 2),
     ("run.steps_env", 3),
 ];
@@ -28,6 +31,8 @@ const COMBINED: &[&str] = &[
     "env.sight_range",
     "algorithm.partitions",
     "algorithm.hold_steps_env",
+    "algorithm.memory_episodes",
+    "algorithm.minibatch_episodes",
 ];
 
 /// Values of settings that are words of another kind.
@@ -78,7 +83,7 @@ fn inner(bound: Bound<f64>, direction: f64) -> f64 {
 }
 
 /// Worlds and algorithms that need nothing but this program.
-const CHOICES: [[&str; 2]; 7] = [
+const CHOICES: [[&str; 2]; 10] = [
     ["env.name=skirmish", "algorithm.name=mackrl"],
     ["env.name=skirmish", "algorithm.name=central-v"],
     ["env.name=matrix-game", "algorithm.name=mackrl"],
@@ -86,6 +91,9 @@ const CHOICES: [[&str; 2]; 7] = [
     ["env.name=skirmish", "algorithm.name=mackrl-ppo"],
     ["env.name=skirmish", "algorithm.name=ippo"],
     ["env.name=matrix-game", "algorithm.name=mackrl-ppo"],
+    ["env.name=skirmish", "algorithm.name=iql"],
+    ["env.name=skirmish", "algorithm.name=qmix"],
+    ["env.name=matrix-game", "algorithm.name=vdn"],
 ];
 
 /// The settings of a choice, its names aside.

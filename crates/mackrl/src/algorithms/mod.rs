@@ -5,6 +5,7 @@
 //! [`built_in`]. Nothing here is closed: a program adds [`AlgorithmKind`]s of its own to its registry.
 
 mod actor_critic;
+mod agentwise;
 mod central_v;
 mod iql;
 mod mackrl;
@@ -22,6 +23,10 @@ use mackrl_env::{
 };
 
 pub use actor_critic::{ActorCritic, ActorCriticSettings, OptimiserName};
+pub use agentwise::{
+    Advantage, Agentwise, AgentwiseKind, AgentwiseSettings, Coma, Counterfactual, Iac, Judge,
+    OwnObservation,
+};
 pub use central_v::CentralV;
 pub use iql::{Iql, Unmixed};
 pub use mackrl::{Levels, Mackrl, MackrlSettings, PartitionChoice};
@@ -199,6 +204,8 @@ pub fn built_in() -> Vec<Arc<dyn AlgorithmKind>> {
         Arc::new(Iql),
         Arc::new(Vdn),
         Arc::new(Qmix),
+        Arc::new(Iac::default()),
+        Arc::new(Coma::default()),
     ]
 }
 

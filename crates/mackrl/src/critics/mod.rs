@@ -5,12 +5,32 @@
 //! so it takes nothing away from decentralised execution.
 
 mod central;
+mod members;
 mod mixers;
 mod team;
 
 pub use central::{CentralCritic, CriticMinibatch, CriticReport, CriticSettings, CriticState};
+pub use members::{MemberCritic, MemberCriticSettings, MemberRows};
 pub use mixers::{Mixer, Monotonic, MonotonicSizes, MonotonicTrace, MonotonicWeights};
 pub use team::{ReturnScale, TeamCritic, TeamCriticSettings, ValueInputs};
 
 /// What the names of the critic's parameters begin with.
 const CRITIC: &str = "critic";
+
+/// `1 − Var(return − V) / Var(return)` over pairs of them; 0 where returns do not vary.
+fn explained<'a>(pairs: impl Iterator<Item = (&'a f32, &'a f32)>) -> f64 {
+    let (mut count, mut returns, mut errors) = (0.0, [0.0; 2], [0.0; 2]);
+    for (&return_, &value) in pairs {
+        let (return_, error) = (f64::from(return_), f64::from(return_ - value));
+        count += 1.0;
+        returns = [returns[0] + return_, returns[1] + return_ * return_];
+        errors = [errors[0] + error, errors[1] + error * error];
+    }
+    let variance = |[sum, squares]: [f64; 2]| squares / count - (sum / count).powi(2);
+    let of_returns = variance(returns);
+    if of_returns > 0.0 {
+        1.0 - variance(errors) / of_returns
+    } else {
+        0.0
+    }
+}

@@ -14,6 +14,7 @@ use crate::{
     Error,
     experience::{Experience, Instance, Piece},
     marginalisation::pair::{PairGradient, PairRows, gradient_alone},
+    nn::elementary::exponentials,
     policy::{Parameters, Recording, TEAM},
 };
 
@@ -197,6 +198,32 @@ impl Hierarchy {
                 pair_rows(pairs, agents, factor).log_q(factor.actions)
             }
             None => agents.log_p(factor.rows[0])[factor.actions[0]],
+        }));
+    }
+
+    /// Writes what each agent that a factor is can expect of a value of its own action: `Σ_a p(a) v(a)`, under the parameters that the
+    /// activations belong to.
+    ///
+    /// # Shapes
+    /// `value_a` gives \[A\] for a factor; `expected_i` becomes as long as `factors`.
+    ///
+    /// # Panics
+    /// If a factor is a pair.
+    pub fn expectations<'v>(
+        &self,
+        activations: &Activations,
+        factors: &[Factor],
+        value_a: impl Fn(&Factor) -> &'v [f32],
+        expected_i: &mut Vec<f32>,
+    ) {
+        let (_, agents) = self.parts.split(activations);
+        let mut p_a = vec![0.0; agents.law().columns];
+        expected_i.clear();
+        expected_i.extend(factors.iter().map(|factor| {
+            assert!(factor.second.is_none(), "an agent's own action");
+            exponentials(agents.log_p(factor.rows[0]), &mut p_a);
+            let terms = p_a.iter().zip(value_a(factor));
+            terms.map(|(p, value)| p * value).sum::<f32>()
         }));
     }
 

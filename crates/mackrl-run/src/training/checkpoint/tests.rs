@@ -59,6 +59,77 @@ fn an_interrupted_run_equals_an_uninterrupted_one_on_any_number_of_threads() {
     }
 }
 
+/// A learner whose memory is full, and forgets, long before the end.
+fn remembering(algorithm: &str) -> Config {
+    let settings = [
+        &format!("algorithm.name={algorithm}"),
+        "algorithm.hidden=5",
+        "algorithm.environments=3",
+        "algorithm.memory_episodes=23",
+        "algorithm.minibatch_episodes=7",
+        "algorithm.target_interval_episodes=13",
+        "algorithm.exploration_steps_env=1009",
+        "test.interval_steps_env=701",
+        "test.episodes=3",
+        "run.metrics_interval_steps_env=307",
+        "run.steps_env=2003",
+    ];
+    Config::with(&settings).unwrap()
+}
+
+#[test]
+fn a_replay_memory_comes_back_to_the_byte_on_any_number_of_threads() {
+    for algorithm in ["iql", "vdn", "qmix"] {
+        let config = remembering(algorithm);
+        let whole = train(&config, &[1], u64::MAX);
+        assert!(whole.0.len() > 5, "tests and rows: {}", whole.0.len());
+        assert_eq!(whole.1.memory, None, "nothing is learnt after the end");
+        for (threads, pause) in [([1, 1], 1), ([2, 1], 3)] {
+            assert!(
+                train(&config, &threads, pause) == whole,
+                "{algorithm} on {threads:?} threads, interrupted every {pause} iterations"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_run_that_goes_on_does_not_do_so_without_its_memory() {
+    let mut trainer = Trainer::new(&remembering("qmix"), 1).unwrap();
+    while trainer.steps_env() < 500 {
+        trainer.update().unwrap();
+    }
+    let sound = trainer.checkpoint();
+    let memory = sound.memory.clone().expect("episodes to learn from");
+    assert!(!memory.episodes.is_empty());
+    let mut refused = |memory: Option<MemoryState>, why: &str| {
+        let damaged = Checkpoint {
+            memory,
+            ..sound.clone()
+        };
+        let error = trainer.restore(&damaged).unwrap_err().to_string();
+        assert!(error.contains(why), "{error}");
+    };
+    refused(None, "checkpoint has no replay memory");
+    let mut cut = memory.clone();
+    cut.episodes[1] = cut.episodes[1][..40].into();
+    refused(Some(cut), "it is cut off");
+    let mut larger = memory;
+    larger.episodes.extend(larger.episodes.clone());
+    larger.episodes.extend(larger.episodes.clone());
+    refused(Some(larger), "expected at most 23");
+    assert!(trainer.checkpoint() == sound, "nothing has changed");
+}
+
+#[test]
+fn agents_with_advantages_of_their_own_resume_as_well() {
+    for algorithm in ["iac", "coma"] {
+        let config = config(algorithm);
+        let whole = train(&config, &[1], u64::MAX);
+        assert!(train(&config, &[2, 1], 2) == whole, "{algorithm}");
+    }
+}
+
 #[test]
 fn rmsprop_resumes_as_well() {
     let mut config = config("central-v");

@@ -1,6 +1,6 @@
 //! How the central critic learns from a batch, and the advantages that come out.
 
-use super::{CentralCritic, CriticMinibatch};
+use super::{super::explained, CentralCritic, CriticMinibatch};
 use crate::{
     NotFinite,
     experience::Episode,
@@ -31,25 +31,6 @@ struct Sweep {
     return_t: Vec<f32>,
     /// V of all states \[T + 1\], each as it was when the sweep passed it.
     value_t: Vec<f32>,
-}
-
-/// `1 − Var(λ-return − V) / Var(λ-return)`, 0 where λ-returns do not vary.
-fn explained(sweeps: &[Sweep]) -> f64 {
-    let states = (sweeps.iter()).flat_map(|sweep| sweep.return_t.iter().zip(&sweep.value_t));
-    let (mut count, mut returns, mut errors) = (0.0, [0.0; 2], [0.0; 2]);
-    for (&return_, &value) in states {
-        let (return_, error) = (f64::from(return_), f64::from(return_ - value));
-        count += 1.0;
-        returns = [returns[0] + return_, returns[1] + return_ * return_];
-        errors = [errors[0] + error, errors[1] + error * error];
-    }
-    let variance = |[sum, squares]: [f64; 2]| squares / count - (sum / count).powi(2);
-    let of_returns = variance(returns);
-    if of_returns > 0.0 {
-        1.0 - variance(errors) / of_returns
-    } else {
-        0.0
-    }
 }
 
 /// A state of a batch: the episode and the time.
@@ -90,7 +71,10 @@ impl CentralCritic {
                 sweep.value_t[episode.steps()] = self.value_of_end(episode);
             }
             report = self.sweep(episodes, &mut sweeps)?;
-            explained_variance.get_or_insert_with(|| explained(&sweeps));
+            explained_variance.get_or_insert_with(|| {
+                let sweeps = sweeps.iter();
+                explained(sweeps.flat_map(|sweep| sweep.return_t.iter().zip(&sweep.value_t)))
+            });
         }
         report.explained_variance = explained_variance.unwrap_or(0.0);
         if self.settings.minibatch == CriticMinibatch::Batch {

@@ -1,0 +1,127 @@
+//! The settings of IAC and COMA.
+
+use mackrl_env::{
+    declare_settings,
+    settings::{Accepts, EXACT, SettingsError, WrongSetting},
+};
+
+use crate::{
+    algorithms::OptimiserName, critics::MemberCriticSettings, nn::OptimiserKind,
+    objectives::ReturnSettings,
+};
+
+declare_settings! {
+    /// Sizes of the networks, how training explores (p = (1 − ε)·softmax + ε·uniform, with ε falling linearly), and how the
+    /// agents and the critic learn.
+    pub struct AgentwiseSettings {
+        /// Units in each hidden layer and each recurrent state of the agents.
+        hidden: usize = 64, Accepts::integer(1, 4096);
+        /// Units in each of the critic's two hidden layers.
+        critic_hidden: usize = 128, Accepts::integer(1, 4096);
+        /// ε, a probability, at the first environment step.
+        exploration_start: f64 = 0.5, Accepts::within(0.0, 1.0);
+        /// ε, a probability, from `algorithm.exploration_steps_env` on; at most `algorithm.exploration_start`.
+        exploration_finish: f64 = 0.01, Accepts::within(0.0, 1.0);
+        /// Environment steps, summed over the parallel environments, over which ε falls.
+        exploration_steps_env: u64 = 100_000, Accepts::integer(1, EXACT);
+        /// How parameters follow the gradient, for the agents and for the critic.
+        optimiser: OptimiserName = OptimiserName::Rmsprop, OptimiserName::ACCEPTS;
+        /// What is added to the root of the mean squared gradient before a step is divided by it.
+        optimiser_epsilon: f64 = 1e-5, Accepts::above_within(0.0, 1.0);
+        /// Of `rmsprop`: how much of the mean squared gradient is kept at a step. The larger, the longer its memory.
+        rmsprop_smoothing: f64 = 0.99, Accepts::within(0.0, 0.999_999);
+        /// Step size of the agents.
+        learning_rate: f64 = 5e-4, Accepts::above_within(0.0, 1.0);
+        /// Step size of the critic.
+        critic_learning_rate: f64 = 5e-4, Accepts::above_within(0.0, 1.0);
+        /// Discount γ of one environment step.
+        gamma: f64 = 0.99, Accepts::within(0.0, 1.0);
+        /// λ of the critic's TD(λ) targets: 0 looks one step ahead, 1 to the end of the episode.
+        lambda: f64 = 0.8, Accepts::within(0.0, 1.0);
+        /// Critic updates between two refreshments of the target critic.
+        target_interval_updates: u64 = 200, Accepts::integer(1, EXACT);
+        /// Longest gradient (Euclidean norm over all parameters of the policy, or of the critic); longer ones are shortened.
+        gradient_norm_max: f64 = 10.0, Accepts::above(0.0);
+        /// Environments that run side by side; each gives one episode to an update.
+        environments: usize = 8, Accepts::integer(1, 4096);
+        /// Pieces into which the environments are cut for work in parallel; as many threads as this can be used. It decides the
+        /// last bits of a result, which the number of threads does not.
+        shards: usize = 2, Accepts::integer(1, 4096);
+    }
+}
+
+impl AgentwiseSettings {
+    /// How parameters follow the gradient.
+    #[must_use]
+    pub const fn optimiser(&self) -> OptimiserKind {
+        match self.optimiser {
+            OptimiserName::Adam => OptimiserKind::Adam {
+                beta1: 0.9,
+                beta2: 0.999,
+                epsilon: self.optimiser_epsilon,
+            },
+            OptimiserName::Rmsprop => OptimiserKind::RmsProp {
+                smoothing: self.rmsprop_smoothing,
+                epsilon: self.optimiser_epsilon,
+            },
+        }
+    }
+
+    /// ε of the bounded softmax after so many environment steps: it falls linearly.
+    #[must_use]
+    pub fn exploration(&self, steps_env: u64) -> f64 {
+        let progress = (steps_env as f64 / self.exploration_steps_env as f64).min(1.0);
+        self.exploration_start + (self.exploration_finish - self.exploration_start) * progress
+    }
+
+    /// The critic of `members` members that reads rows of `inputs` numbers and gives rows of `outputs`.
+    pub(super) fn critic(
+        &self,
+        [inputs, outputs]: [usize; 2],
+        members: usize,
+    ) -> MemberCriticSettings {
+        MemberCriticSettings {
+            inputs,
+            hidden: self.critic_hidden,
+            outputs,
+            members,
+            optimiser: self.optimiser(),
+            learning_rate: self.critic_learning_rate,
+            gradient_norm_max: self.gradient_norm_max,
+            returns: ReturnSettings {
+                gamma: self.gamma,
+                lambda: self.lambda,
+            },
+            target_interval_updates: self.target_interval_updates,
+        }
+    }
+
+    /// Checks what the range of a single setting does not say: exploration falls.
+    ///
+    /// # Errors
+    /// [`SettingsError::AtOdds`] if it rises.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        let (start, finish) = (self.exploration_start, self.exploration_finish);
+        if finish <= start {
+            return Ok(());
+        }
+        let wrong = |name: &str, found: f64, expected| WrongSetting {
+            name: name.to_owned(),
+            found: format!("{found:?}"),
+            expected,
+            nearest: None,
+        };
+        Err(SettingsError::AtOdds(Box::new([
+            wrong(
+                "exploration_finish",
+                finish,
+                format!("at most {start:?}, which is algorithm.exploration_start"),
+            ),
+            wrong(
+                "exploration_start",
+                start,
+                format!("at least {finish:?}, which is algorithm.exploration_finish"),
+            ),
+        ])))
+    }
+}
