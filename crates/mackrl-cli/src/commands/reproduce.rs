@@ -8,7 +8,7 @@ use crate::{
     args::{Figure, ReproduceArgs},
     output,
     progress::Meter,
-    reproduce::{ablations, all, figure5, figure6, figure7},
+    reproduce::{ablations, all, figure5, figure6, figure7, protocol},
 };
 
 pub(crate) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
@@ -17,6 +17,7 @@ pub(crate) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
         Figure::Figure6(options) => (&figure6::FIGURE, &options.learning, None),
         Figure::Figure7(options) => (&figure7::FIGURE, &options.learning, None),
         Figure::Ablations(options) => (&ablations::FIGURE, &options.learning, Some(&*options.map)),
+        Figure::Protocol(options) => return print(&protocol::run(options)?, options.json),
         Figure::All(options) => return print(&all::run(options)?, options.learning.json),
     };
     print(&figure.run(options, map)?, options.json)

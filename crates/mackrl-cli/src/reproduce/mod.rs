@@ -9,6 +9,7 @@ pub(crate) mod figure5;
 pub(crate) mod figure6;
 pub(crate) mod figure7;
 mod learning;
+pub(crate) mod protocol;
 
 use std::{fs, path::Path};
 
