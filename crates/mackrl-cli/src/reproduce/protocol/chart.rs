@@ -78,7 +78,7 @@ fn delegation_of(delegation: &Delegation) -> Chart {
         })
     });
     Chart::Multiples(SmallMultiples {
-        title: "Delegation by commonly known enemies, 2s3z".to_owned(),
+        title: "When pairs delegate, 2s3z".to_owned(),
         subtitle: "Chosen pairs with common knowledge".to_owned(),
         x_axis: Axis {
             label: "Enemies in the pair's common knowledge".to_owned(),

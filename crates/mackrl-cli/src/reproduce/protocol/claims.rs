@@ -18,6 +18,8 @@ pub(super) struct Statement {
     map: &'static str,
     /// Two learners, each with what is changed in the configuration; empty for nothing.
     pair: [[&'static str; 2]; 2],
+    /// Seeds of either learner, and environment steps of a run, without which it is not tested.
+    needs: (usize, u64),
     rule: Rule,
     remark: &'static str,
 }
@@ -65,6 +67,7 @@ impl Statement {
         source: ClaimSource::Reproduction,
         map: "2s3z",
         pair: [MACKRL, CENTRAL_V],
+        needs: (16, 2_500_000),
         rule: Rule::Above(Quantity::End, 0.0),
         remark: "",
     };
@@ -75,6 +78,11 @@ impl Statement {
     const PAPER_ON_3M: Self = Self {
         map: "3m",
         ..Self::PAPER_ON_2S3Z
+    };
+    const ABLATION: Self = Self {
+        needs: (10, 1_000_000),
+        rule: Rule::Above(Quantity::All, 0.0),
+        ..Self::ON_2S3Z
     };
 }
 
@@ -139,43 +147,37 @@ pub(super) const ABLATIONS: &[Statement] = &[
         pair: [[LEARNERS[0], "always"], [LEARNERS[1], "small"]],
         rule: Rule::Within(Quantity::All, EQUAL),
         remark: "Both start from weights of their own, so single runs differ.",
-        ..Statement::ON_2S3Z
+        ..Statement::ABLATION
     },
     Statement {
         claim: "The gain comes from acting jointly: MACKRL wins more than a team that always delegates",
         pair: [LEARNED, [LEARNERS[0], "always"]],
-        rule: Rule::Above(Quantity::All, 0.0),
-        ..Statement::ON_2S3Z
+        ..Statement::ABLATION
     },
     Statement {
         claim: "The gain does not come from size: MACKRL wins more than a Central-V with as many parameters",
         pair: [LEARNED, [LEARNERS[1], "large"]],
-        rule: Rule::Above(Quantity::All, 0.0),
-        ..Statement::ON_2S3Z
+        ..Statement::ABLATION
     },
     Statement {
         claim: "Learning when to delegate helps: MACKRL wins more than a team that acts jointly wherever it can",
         pair: [LEARNED, [LEARNERS[0], "never"]],
-        rule: Rule::Above(Quantity::All, 0.0),
-        ..Statement::ON_2S3Z
+        ..Statement::ABLATION
     },
     Statement {
         claim: "Learning the partition helps: MACKRL wins more than with a uniform selector",
         pair: [LEARNED, [LEARNERS[0], "uniform-selector"]],
-        rule: Rule::Above(Quantity::All, 0.0),
-        ..Statement::ON_2S3Z
+        ..Statement::ABLATION
     },
     Statement {
         claim: "A choice of partitions helps: MACKRL wins more than with one fixed partition",
         pair: [LEARNED, [LEARNERS[0], "one-partition"]],
-        rule: Rule::Above(Quantity::All, 0.0),
-        ..Statement::ON_2S3Z
+        ..Statement::ABLATION
     },
     Statement {
         claim: "Health, shield and unit type in the common knowledge help",
         pair: [[LEARNERS[0], "complete-features"], LEARNED],
-        rule: Rule::Above(Quantity::All, 0.0),
-        ..Statement::ON_2S3Z
+        ..Statement::ABLATION
     },
 ];
 
@@ -196,9 +198,12 @@ impl Statement {
     }
 
     fn judge_cells(&self, cells: [Option<&Cell>; 2]) -> Judgement {
+        let (seeds, steps) = self.needs;
+        let is_enough =
+            |cell: &Cell| cell.is_whole() && cell.planned >= seeds && cell.steps >= steps;
         if let [Some(first), Some(second)] = cells
-            && first.is_whole()
-            && second.is_whole()
+            && is_enough(first)
+            && is_enough(second)
         {
             let (holds, evidence) = self.rule.apply(first, second);
             let evidence = format!("{evidence} {}", self.remark);
@@ -212,26 +217,25 @@ impl Statement {
                 evidence: evidence.trim_end().to_owned(),
             };
         }
-        let needs = self
+        let there = self
             .pair
             .iter()
             .zip(cells)
             .map(|([learner, variant], cell)| {
                 let name = format!("{learner} {variant}");
-                match cell {
-                    Some(cell) => format!(
-                        "{} runs of {} ({} are there), {} steps each",
-                        cell.planned,
-                        name.trim_end(),
-                        cell.runs.len(),
-                        cell.steps
-                    ),
-                    None => format!("a plan for {} on {}", name.trim_end(), self.map),
-                }
+                let there = match cell {
+                    Some(cell) => format!("{} of {} steps", cell.runs.len(), cell.steps),
+                    None => "no plan".to_owned(),
+                };
+                format!("{} on {}: {there}", name.trim_end(), self.map)
             });
+        let there: Vec<String> = there.collect();
         Judgement {
             verdict: Verdict::NotTested,
-            evidence: format!("needs {}.", needs.collect::<Vec<_>>().join(", and ")),
+            evidence: format!(
+                "needs {seeds} runs of either, of {steps} steps; there are, of {}.",
+                there.join(", of ")
+            ),
         }
     }
 }

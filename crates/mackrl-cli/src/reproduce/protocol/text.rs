@@ -67,11 +67,15 @@ fn averages(cells: &[CellReport]) -> String {
             cell.name.clone(),
             format!("{} of {}", cell.runs, cell.planned),
         ];
-        row.extend(
-            cell.averages
-                .iter()
-                .map(|average| interval(average.interquartile_mean)),
-        );
+        row.extend(cell.averages.iter().map(|average| {
+            let of = average.interquartile_mean;
+            // A run that ends before a step has no score there.
+            if of.estimate.is_finite() {
+                interval(of)
+            } else {
+                "–".to_owned()
+            }
+        }));
         row
     };
     output::table(
