@@ -261,6 +261,25 @@ fn a_setting_is_explained_with_its_value_everywhere() {
 }
 
 #[test]
+fn metrics_are_explained() {
+    let text = type_in("config --metrics --algorithm central-v").succeeds();
+    for line in [
+        "explained_variance",
+        "saturation_agent_controller",
+        "test_distinct_openings",
+    ] {
+        assert!(text.lines().any(|found| found == line), "{line}");
+    }
+    assert!(!text.contains("pair_controller"), "{text}");
+    let json = type_in("config --metrics --algorithm mackrl --json").succeeds();
+    let json: Vec<serde_json::Value> = serde_json::from_str(&json).expect("a JSON array");
+    assert!(
+        json.iter()
+            .any(|metric| metric["name"] == "entropy_share_pair_controller")
+    );
+}
+
+#[test]
 fn the_schema_is_json_and_every_printed_value_has_its_origin() {
     let schema = type_in("config --schema").succeeds();
     let schema: serde_json::Value = serde_json::from_str(&schema).expect("a JSON object");

@@ -24,7 +24,7 @@ use mackrl_run::provenance::CODE;
 
 use crate::reproduce::{
     ablations::AblationOptions, all::AllOptions, figure5::Figure5Options, figure6::Figure6Options,
-    figure7::Figure7Options, ppo::PpoOptions, zoo::ZooOptions,
+    figure7::Figure7Options, ppo::PpoOptions, protocol::ProtocolOptions, zoo::ZooOptions,
 };
 pub(crate) use analysis::{CurveAxis, CurveStatistic, PlotArgs, ReportArgs};
 pub(crate) use bench::{
@@ -124,6 +124,7 @@ pub(crate) enum Figure {
     Figure6(Figure6Options),
     Figure7(Figure7Options),
     Ablations(AblationOptions),
+    Protocol(ProtocolOptions),
     All(AllOptions),
     Ppo(PpoOptions),
     Zoo(ZooOptions),
@@ -160,16 +161,20 @@ pub(crate) struct MapsArgs {
 /// configuration file.
 ///
 /// Examples: mackrl config --print --preset paper --set algorithm.gamma=0.95 > mine.toml; mackrl config --explain algorithm.gamma;
-/// mackrl config --explain run; mackrl config --schema > mackrl.schema.json
+/// mackrl config --explain run; mackrl config --metrics --algorithm mackrl; mackrl config --schema > mackrl.schema.json
 #[derive(Debug, Args)]
 pub(crate) struct ConfigArgs {
     /// Print every setting with its value (the default)
-    #[arg(long, conflicts_with_all = ["explain", "schema"])]
+    #[arg(long, conflicts_with_all = ["explain", "schema", "metrics"])]
     pub(crate) print: bool,
 
     /// Explain a setting, or all of a section: meaning, unit, values that it takes, its value in each preset and why
-    #[arg(long, value_name = "KEY", conflicts_with = "schema")]
+    #[arg(long, value_name = "KEY", conflicts_with_all = ["schema", "metrics"])]
     pub(crate) explain: Option<String>,
+
+    /// Explain the metrics that a run of this configuration reports
+    #[arg(long, conflicts_with = "schema")]
+    pub(crate) metrics: bool,
 
     /// Print a JSON schema of configuration files (draft 2020-12), for editors and programs
     #[arg(long)]

@@ -8,7 +8,7 @@ use crate::{
     args::{Figure, ReproduceArgs},
     output,
     progress::Meter,
-    reproduce::{ablations, all, figure5, figure6, figure7, ppo, zoo},
+    reproduce::{ablations, all, figure5, figure6, figure7, ppo, protocol, zoo},
 };
 
 pub(crate) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
@@ -19,6 +19,7 @@ pub(crate) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
         Figure::Ablations(options) => (&ablations::FIGURE, &options.learning, Some(&*options.map)),
         Figure::Ppo(options) => return print(&ppo::run(options)?, options.json),
         Figure::Zoo(options) => return print(&zoo::run(options)?, options.json),
+        Figure::Protocol(options) => return print(&protocol::run(options)?, options.json),
         Figure::All(options) => return print(&all::run(options)?, options.learning.json),
     };
     print(&figure.run(options, map)?, options.json)

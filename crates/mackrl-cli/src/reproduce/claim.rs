@@ -33,26 +33,32 @@ pub(crate) enum ClaimSource {
 impl Claim {
     /// Writes the verdict, the claim and the evidence, wrapped.
     fn write(&self, out: &mut Formatter<'_>) -> Result {
-        let verdict = if self.holds {
-            "holds        "
-        } else {
-            "does not hold"
-        };
-        let source = match self.source {
-            ClaimSource::Paper => "paper",
-            ClaimSource::Reproduction => "ours ",
-        };
-        let mut heading = format!("  {verdict}  {source}  ");
-        let indent = " ".repeat(heading.chars().count());
-        for line in wrapped(&self.claim, COLUMNS - indent.len()) {
-            writeln!(out, "{heading}{line}")?;
-            heading.clone_from(&indent);
-        }
-        for line in wrapped(&self.evidence, COLUMNS - 6) {
-            writeln!(out, "      {line}")?;
-        }
-        Ok(())
+        let verdict = if self.holds { "holds" } else { "does not hold" };
+        write_verdict(out, verdict, self.source, [&self.claim, &self.evidence])
     }
+}
+
+/// Writes a verdict, a claim and the evidence, wrapped.
+pub(super) fn write_verdict(
+    out: &mut Formatter<'_>,
+    verdict: &str,
+    source: ClaimSource,
+    [claim, evidence]: [&str; 2],
+) -> Result {
+    let source = match source {
+        ClaimSource::Paper => "paper",
+        ClaimSource::Reproduction => "ours ",
+    };
+    let mut heading = format!("  {verdict:<13}  {source}  ");
+    let indent = " ".repeat(heading.chars().count());
+    for line in wrapped(claim, COLUMNS - indent.len()) {
+        writeln!(out, "{heading}{line}")?;
+        heading.clone_from(&indent);
+    }
+    for line in wrapped(evidence, COLUMNS - 6) {
+        writeln!(out, "      {line}")?;
+    }
+    Ok(())
 }
 
 /// Writes all verdicts, below a heading.

@@ -11,6 +11,7 @@ pub(crate) mod figure7;
 mod learning;
 mod page;
 pub(crate) mod ppo;
+pub(crate) mod protocol;
 pub(crate) mod zoo;
 
 use std::{fs, path::Path};

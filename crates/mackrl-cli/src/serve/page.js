@@ -1,6 +1,6 @@
 "use strict";
 const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a5195", "#8c8c00"];
-const GROUPS = [["Greedy tests", /^test_/], ["Training", /^[^/]*$/], ["Controllers", /^mackrl\//], ["Speed and system", /^sys\//], ["Others", /./]];
+const GROUPS = [["Greedy tests", /^test_/], ["Do controllers and critic read what they see?", /^(saturation_|logit_|entropy_share_|explained_variance)/], ["Training", /^[^/]*$/], ["Controllers", /^mackrl\//], ["Speed and system", /^sys\//], ["Others", /./]];
 /** Settings that tell repetitions, and not experiments, apart. */
 const OF_SEEDS = new Set(["run.seed"]);
 const GRID = 300;

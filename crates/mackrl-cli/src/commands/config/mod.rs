@@ -3,7 +3,10 @@
 mod explanation;
 
 use explanation::{Explainer, Explanation};
-use mackrl_run::config::{Origin, Resolved, Setting, schema};
+use mackrl_run::{
+    config::{Config, Origin, Resolved, Setting, schema},
+    training::explained,
+};
 use serde::Serialize;
 
 use crate::{args::ConfigArgs, output};
@@ -30,10 +33,32 @@ pub(crate) fn run(args: &ConfigArgs) -> anyhow::Result<()> {
         let texts: Vec<String> = explanations.iter().map(Explanation::text).collect();
         return output::print(&texts.join("\n"));
     }
+    if args.metrics {
+        return print_metrics(resolved.config(), args.json);
+    }
     if args.json {
         return output::print_json(&settled(&resolved));
     }
     output::print(&with_origins(&resolved))
+}
+
+/// A metric's name, or the part before a number, and what it means.
+#[derive(Debug, Serialize)]
+struct Metric {
+    name: String,
+    meaning: String,
+}
+
+fn print_metrics(config: &Config, json: bool) -> anyhow::Result<()> {
+    let metrics = explained(config)?.into_iter();
+    let metrics: Vec<Metric> = metrics
+        .map(|(name, meaning)| Metric { name, meaning })
+        .collect();
+    if json {
+        return output::print_json(&metrics);
+    }
+    let text = |Metric { name, meaning }: &Metric| format!("{name}\n  {meaning}\n");
+    output::print(&metrics.iter().map(text).collect::<String>())
 }
 
 /// A setting with its value.

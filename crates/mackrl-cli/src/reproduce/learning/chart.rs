@@ -101,7 +101,7 @@ impl Report {
 }
 
 /// Our curves on a map, and the published points up to the last step that is shown.
-fn win_rates(panel: &Panel, steps: &[u64]) -> Vec<Series> {
+pub(crate) fn win_rates(panel: &Panel, steps: &[u64]) -> Vec<Series> {
     let learned = |name: &str, colour, curve: &Curve| {
         line(
             format!("{name} ({})", curve.runs),
@@ -131,7 +131,7 @@ fn win_rates(panel: &Panel, steps: &[u64]) -> Vec<Series> {
 }
 
 /// Curves that end high leave room below, others above where they begin.
-fn emptiest_corner(panel: &Panel) -> Corner {
+pub(crate) fn emptiest_corner(panel: &Panel) -> Corner {
     let ends = [&panel.mackrl, &panel.central_v].map(|curve| curve.mean.last().copied());
     if ends.into_iter().flatten().all(|end| end > 0.5) {
         Corner::LowerRight

@@ -23,11 +23,12 @@ use mackrl_run::recorded::TrainingRun;
 use serde::Serialize;
 
 use super::{make_folder, save};
+pub(crate) use chart::{emptiest_corner, win_rates};
 pub(crate) use curve::{Curve, Difference};
 pub(crate) use options::LearningOptions;
 #[cfg(test)]
 pub(crate) use report::Variant;
-pub(crate) use report::{Body, Published, PublishedMoment, Report};
+pub(crate) use report::{Body, Panel, Published, PublishedMoment, Report};
 pub(crate) use statement::{Rule, Score, Statement};
 use train::{Job, train_all};
 

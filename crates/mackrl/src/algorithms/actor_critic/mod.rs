@@ -37,7 +37,7 @@ const METRICS: &[(&str, &str)] = &[
     ),
     (
         "agent_update_length",
-        "root mean square over the policy's parameters of what the step size multiplies, before it is bounded: about 1 while gradients are as large as they have been",
+        "root mean square over the policy's parameters of what the step size multiplies, before it is bounded: 1 if every gradient is as large as it has been",
     ),
     ("advantage_mean", "mean of the advantages A_t"),
     (

@@ -64,7 +64,7 @@ declare_settings! {
         /// Longest gradient (Euclidean norm over all parameters of the policy, or of the critic); longer ones are shortened.
         gradient_norm_max: f64 = 10.0, Accepts::above(0.0);
         /// Longest update of the controllers, as the root mean square over all parameters of what the step size multiplies; longer ones are
-        /// shortened. Usual updates have about 1, one with large gradients after a calm up to 10. 0: no bound, as in the authors' code.
+        /// shortened. Usual updates have .2 to 1, some with large gradients after a calm more. 0: no bound, as in the authors' code.
         update_length_max: f64 = 0.0, Accepts::within(0.0, 1000.0);
         /// What a step counts for in the policy's loss: all steps of a batch alike, or, as in the authors' code, those of each time
         /// slot together as much as those of another, so that late steps of long episodes count for more; a buffer has one slot more

@@ -1,0 +1,135 @@
+//! The protocol's charts.
+
+use super::{
+    ProtocolReport, Study,
+    delegation::{Delegation, Moment},
+    study::{Cell, LEARNERS},
+};
+use crate::{
+    plot::{Axis, Colour, LineChart, Mark, Multiple, Point, Series, SmallMultiples},
+    reproduce::{
+        Chart, figure6,
+        learning::{Curve, Curves, Panel, Published, emptiest_corner, win_rates},
+    },
+};
+
+/// Figure 6 of each map and configuration of which both learners have two runs, and Figure 7; each with the name of its files.
+pub(super) fn charts(study: &Study, report: &ProtocolReport) -> Vec<(String, Chart)> {
+    let Curves::Maps(published) = figure6::FIGURE.curves else {
+        return Vec::new();
+    };
+    let mut charts = Vec::new();
+    for (map, published) in figure6::FIGURE.maps.iter().zip(published) {
+        for configuration in study.configurations() {
+            let cells = LEARNERS.map(|learner| study.cell(map, [learner, &configuration, ""]));
+            if let [Some(mackrl), Some(central_v)] = cells
+                && [mackrl, central_v].iter().all(|cell| cell.runs.len() > 1)
+            {
+                let name = format!("figure6-{map}-{configuration}");
+                charts.push((name, win_rates_of([mackrl, central_v], published)));
+            }
+        }
+    }
+    if let Some(delegation) = &report.delegation {
+        charts.push(("figure7".to_owned(), delegation_of(delegation)));
+    }
+    charts
+}
+
+fn win_rates_of(cells: [&Cell; 2], published: &'static Published) -> Chart {
+    let curve = |cell: &Cell| {
+        let runs: Vec<&[f64]> = cell.runs.values().map(|run| &*run.battle_won).collect();
+        Curve::of(&runs)
+    };
+    let [mackrl, central_v] = cells;
+    let panel = Panel {
+        map: mackrl.map.clone(),
+        mackrl: curve(mackrl),
+        central_v: curve(central_v),
+        published,
+    };
+    let axis = |label: &str, range| Axis {
+        label: label.to_owned(),
+        range,
+    };
+    Chart::Lines(LineChart {
+        title: format!("Battles won on {}, {}", panel.map, mackrl.configuration),
+        subtitle: figure6::FIGURE.subtitle.to_owned(),
+        x_axis: axis(figure6::FIGURE.axes[0], None),
+        y_axis: axis(figure6::FIGURE.axes[1], Some([-0.02, 1.02])),
+        legend: emptiest_corner(&panel),
+        series: win_rates(&panel, &mackrl.places()),
+    })
+}
+
+fn delegation_of(delegation: &Delegation) -> Chart {
+    let sources = [
+        ("training", &delegation.training),
+        ("greedy tests", &delegation.tests),
+    ];
+    let panels = sources.into_iter().flat_map(|(source, moments)| {
+        moments.iter().map(move |moment| Multiple {
+            title: match moment.steps {
+                0 => format!("{source}, at first"),
+                steps => format!("{source}, {} k steps", steps / 1000),
+            },
+            note: String::new(),
+            series: series(moment),
+        })
+    });
+    Chart::Multiples(SmallMultiples {
+        title: "When pairs delegate, 2s3z".to_owned(),
+        subtitle: "Chosen pairs with common knowledge".to_owned(),
+        x_axis: Axis {
+            label: "Enemies in the pair's common knowledge".to_owned(),
+            range: Some([-0.1, 5.1]),
+        },
+        y_axis: Axis {
+            label: "Share of pairs that delegate".to_owned(),
+            range: Some([-0.02, 1.02]),
+        },
+        columns: 4,
+        panels: panels.collect(),
+    })
+}
+
+fn series(moment: &Moment) -> Vec<Series> {
+    let points = |rates: &[Option<f64>]| -> Vec<Point> {
+        let rates = rates.iter().enumerate();
+        rates
+            .filter_map(|(enemies, rate)| Some(Point::exact(enemies as f64, (*rate)?)))
+            .collect()
+    };
+    let of = |name: Option<&str>, colour, mark, points| Series {
+        name: name.map(str::to_owned),
+        colour,
+        mark,
+        points,
+    };
+    let runs = moment.runs.iter().enumerate().map(|(number, (_, rates))| {
+        let name = (number == 0).then_some("each run");
+        of(name, Colour::GREY, Mark::Line, points(rates))
+    });
+    let published: Vec<Option<f64>> = moment.published.iter().copied().map(Some).collect();
+    let rest = [
+        of(
+            Some("share of the cases"),
+            Colour::GREEN,
+            Mark::Line,
+            points(&moment.cases),
+        ),
+        of(
+            Some("published 2018"),
+            Colour::VERMILLION,
+            Mark::Rings,
+            points(&published),
+        ),
+        of(
+            Some("mean of the runs"),
+            Colour::BLUE,
+            Mark::Line,
+            points(&moment.mean),
+        ),
+    ];
+    runs.chain(rest).collect()
+}
