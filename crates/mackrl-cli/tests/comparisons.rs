@@ -94,6 +94,29 @@ fn a_zoo_is_trained_once_told_and_published() {
     assert!(told.starts_with("won "), "{told}");
     assert!(told.contains("battles (best weights, of step "), "{told}");
 
+    // Where the best weights are better by more than chance, evaluating the last says so.
+    let told = || {
+        let run = zoo.join("3m");
+        let output = mackrl(&["evaluate", "--episodes", "1"], &[("--", &run)]);
+        String::from_utf8(output.stderr).expect("text")
+    };
+    let path = zoo.join("3m/run.json");
+    let mut record: Value =
+        serde_json::from_slice(&fs::read(&path).expect("a record")).expect("JSON");
+    for (best, is_better) in [(0.5, false), (0.9, true)] {
+        for (which, mean) in [("last", 0.5), ("best", best)] {
+            record["teams"][which]["mean"] = mean.into();
+            record["teams"][which]["standard_error"] = 0.1.into();
+        }
+        fs::write(&path, record.to_string()).expect("a record can be changed");
+        assert_eq!(
+            told().contains("with --checkpoint best"),
+            is_better,
+            "{}",
+            told()
+        );
+    }
+
     let record = fs::read(out.join("3m/run.json")).expect("a record");
     assert_eq!(json(&mackrl(&words, &paths)), first);
     assert_eq!(fs::read(out.join("3m/run.json")).expect("a record"), record);

@@ -21,6 +21,7 @@ const SETTINGS: &str = "run.metrics_interval_steps_env = 200\n\
      algorithm.target_interval_updates = 31\n\
      algorithm.exploration_steps_env = 1000\n\
      test.interval_steps_env = 500\n\
+     run.weights_interval_steps_env = 400\n\
      test.episodes = 2\n";
 
 /// Writes a plan of runs on 3m with so many environment steps.

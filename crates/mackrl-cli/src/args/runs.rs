@@ -11,7 +11,7 @@ use crate::args::{ConfigurationArgs, EPISODES_MOST, count_to};
 ///
 /// The folder holds config.toml (everything that determines the result), metrics.jsonl (one JSON object a line),
 /// weights.safetensors (the last, readable from PyTorch), weights/ (those that did best in a test, and more with
-/// run.weights_interval_steps_env), checkpoints/ (from which an interrupted run goes on) and run.json (command, version, status,
+/// `run.weights_interval_steps_env`), checkpoints/ (from which an interrupted run goes on) and run.json (command, version, status,
 /// how the last and the best weights play). A folder that holds a run is never overwritten. The number of threads changes the
 /// speed and nothing else.
 ///
@@ -138,7 +138,7 @@ pub(crate) struct CertifyArgs {
 #[derive(Debug, Args)]
 pub(crate) struct WeightsArgs {
     /// Weights to use: last, best (in the tests of training), or a number of steps N at which the run kept some, as
-    /// run.weights_interval_steps_env asks for
+    /// `run.weights_interval_steps_env` asks for
     #[arg(long, value_name = "WHICH", default_value_t)]
     pub(crate) checkpoint: WhichWeights,
 }

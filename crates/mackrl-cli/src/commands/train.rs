@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use mackrl::nn::InstructionSet;
 use mackrl_run::{
     config::Config,
-    run_folder::RunFolder,
+    run_folder::{RunFolder, read_description},
     training::Teams,
     training_loop::{self, Summary},
 };
+use mackrl_skirmish::SKIRMISH;
 
 use crate::{
     args::TrainArgs,
@@ -50,11 +51,19 @@ pub(super) fn print(summary: &Summary, json: bool) -> anyhow::Result<()> {
         summary.steps_env,
         summary.wall_s,
         summary.steps_per_s,
-        match summary.teams.better() {
-            Some(_) => " --checkpoint best",
-            None => " --save-replays 3",
-        },
+        flags(summary),
     ))
+}
+
+/// What is worth adding to the next command: the better weights, or battles to look at, if they can be had.
+fn flags(summary: &Summary) -> &'static str {
+    if summary.teams.better().is_some() {
+        return " --checkpoint best";
+    }
+    match read_description(&summary.folder) {
+        Ok((config, _)) if config.env.name() == SKIRMISH => " --save-replays 3",
+        _ => "",
+    }
 }
 
 /// How the last weights and the best play, in sentences.

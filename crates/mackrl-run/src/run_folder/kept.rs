@@ -160,7 +160,7 @@ pub(super) fn restore(
                 kept.insert(which, fingerprint.clone());
             }
             Ok(_) | Err(RunError::BadData { .. }) => {
-                lost.push(run.shown(path).display().to_string())
+                lost.push(run.shown(path).display().to_string());
             }
             Err(error) => return Err(error),
         }

@@ -41,11 +41,8 @@ const PAGE: &str = "README.md";
 /// seen, and minutes on one thread. Each claim is judged by a rule that stands beside it; one for which there are too few
 /// runs is not judged.
 ///
-/// Examples:
-///   mackrl reproduce ppo --jobs 2
-///   mackrl reproduce ppo --as-it-stands
+/// Examples: mackrl reproduce ppo --jobs 2; mackrl reproduce ppo --as-it-stands
 #[derive(Debug, Clone, Args)]
-#[command(verbatim_doc_comment)]
 pub(crate) struct PpoOptions {
     /// Plan of the runs
     #[arg(long, value_name = "FILE", default_value = "results/ppo/plan.toml")]

@@ -206,49 +206,63 @@ impl<'a> Duel<'a> {
     }
 }
 
+/// What is claimed of the two learners of a duel.
+struct Statement {
+    /// Between the two names.
+    words: &'static str,
+    /// On how many maps.
+    maps: &'static str,
+    measured: &'static str,
+    score: fn(&Cell) -> Vec<f64>,
+    /// The rule, for the number of maps on which the first is ahead and behind.
+    holds: fn(usize, usize) -> bool,
+}
+
+const STATEMENTS: [Statement; 3] = [
+    Statement {
+        words: "ends at least level with",
+        maps: "every map",
+        measured: "Battles won at the end",
+        score: ends,
+        holds: |_, behind| behind == 0,
+    },
+    Statement {
+        words: "ends ahead of",
+        maps: "at least one map",
+        measured: "Battles won at the end",
+        score: ends,
+        holds: |ahead, _| ahead > 0,
+    },
+    Statement {
+        words: "learns at least as fast as",
+        maps: "every map",
+        measured: "Battles won in the mean over all tests",
+        score: areas,
+        holds: |_, behind| behind == 0,
+    },
+];
+
 /// The verdicts, and the claims for which runs are lacking.
 fn claims(cells: &[Cell]) -> (Vec<Claim>, Vec<String>) {
     let (mut claims, mut not_judged) = (Vec::new(), Vec::new());
+    let named = |maps: &[&str]| match maps {
+        [] => "none".to_owned(),
+        maps => maps.join(", "),
+    };
     for duel in OTHERS.map(|other| Duel::new(other, cells)) {
-        let rule = "ahead and behind mean by more than two standard errors";
-        let named = |maps: &[&str]| match maps {
-            [] => "none".to_owned(),
-            maps => maps.join(", "),
-        };
-        let statements: [(&str, &str, fn(&Cell) -> Vec<f64>, fn(usize, usize) -> bool); 3] = [
-            (
-                "ends at least level with",
-                "battles won at the end",
-                ends,
-                |_, behind| behind == 0,
-            ),
-            (
-                "ends ahead of",
-                "battles won at the end",
-                ends,
-                |ahead, _| ahead > 0,
-            ),
-            (
-                "learns at least as fast as",
-                "battles won in the mean over all tests",
-                areas,
-                |_, behind| behind == 0,
-            ),
-        ];
-        for (words, measured, score, rule_holds) in statements {
-            let quantity = if words == "ends ahead of" {
-                "at least one map"
-            } else {
-                "every map"
-            };
-            let claim = format!(
-                "MACKRL-PPO {words} {} on {quantity}",
-                duel.other.to_uppercase()
-            );
+        for statement in STATEMENTS {
+            let Statement {
+                words,
+                maps,
+                measured,
+                score,
+                holds,
+            } = statement;
+            let claim = format!("MACKRL-PPO {words} {} on {maps}", duel.other.to_uppercase());
             if duel.maps.is_empty() || !duel.lacking.is_empty() {
+                let lacking = named(&duel.lacking);
                 not_judged.push(format!(
-                    "{claim} (fewer than {RUNS_LEAST} runs of each on {})",
-                    named(&duel.lacking)
+                    "{claim} (fewer than {RUNS_LEAST} runs of each on {lacking})"
                 ));
                 continue;
             }
@@ -256,9 +270,9 @@ fn claims(cells: &[Cell]) -> (Vec<Claim>, Vec<String>) {
             claims.push(Claim {
                 claim,
                 source: ClaimSource::Reproduction,
-                holds: rule_holds(ahead.len(), behind.len()),
+                holds: holds(ahead.len(), behind.len()),
                 evidence: format!(
-                    "{measured}, difference: {differences}; ahead on {}, behind on {} ({rule}).",
+                    "{measured}, difference: {differences}; ahead on {}, behind on {}, by more than two standard errors.",
                     named(&ahead),
                     named(&behind)
                 ),

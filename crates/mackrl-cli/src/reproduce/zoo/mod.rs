@@ -57,13 +57,10 @@ const MARKS: &str = "zoo";
 /// `<!-- zoo: end -->`. --publish copies what is worth keeping of each run: configuration, record, metrics, last and best weights,
 /// and two battles of the best team as replays. A published team is a run folder: `mackrl evaluate zoo/3m --checkpoint best`.
 ///
-/// Examples:
-///   mackrl reproduce zoo --page docs/zoo.md
-///   mackrl reproduce zoo --maps 3m,2s3z --publish zoo
+/// Examples: mackrl reproduce zoo --page docs/zoo.md; mackrl reproduce zoo --maps 3m,2s3z --publish zoo
 #[derive(Debug, Clone, Args)]
-#[command(verbatim_doc_comment)]
 pub(crate) struct ZooOptions {
-    /// Maps to learn on, separated by commas [default: 3m,8m,2s3z,3s5z,5m_vs_6m,1c3s5z,MMM,MMM2]
+    /// Maps to learn on, separated by commas [default: `3m,8m,2s3z,3s5z,5m_vs_6m,1c3s5z,MMM,MMM2`]
     #[arg(long, value_name = "MAPS", value_delimiter = ',')]
     maps: Vec<String>,
 

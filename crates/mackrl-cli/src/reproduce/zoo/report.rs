@@ -124,8 +124,11 @@ impl Display for Report {
     }
 }
 
-/// "98.1 % ± 0.8"
+/// "98.1 % ± 0.8"; where all battles end alike, there is no spread to estimate an error from.
 fn won(score: &Score) -> String {
+    if score.standard_error == 0.0 {
+        return format!("{:.0} %", 100.0 * score.mean);
+    }
     format!(
         "{:.1} % ± {:.1}",
         100.0 * score.mean,
