@@ -88,7 +88,7 @@ pub(super) fn write(
 
 /// Whether an earlier checkpoint has a replay memory and this one, the last of a run, needs none any more: memories are large.
 fn outlives_memory(run: &Folder, checkpoint: &Checkpoint, earlier: u64) -> Result<bool> {
-    Ok(checkpoint.memory.is_none() && run.kind(&place(earlier).join(MEMORY))?.is_some())
+    Ok(checkpoint.memory.is_none() && run.kind(place(earlier).join(MEMORY))?.is_some())
 }
 
 /// Makes the folder of the checkpoints, unless it is there.
