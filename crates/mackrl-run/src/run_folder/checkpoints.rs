@@ -56,7 +56,8 @@ pub(super) struct Stored {
     pub(super) metrics: Option<Growing>,
 }
 
-/// Writes the checkpoint with this number, unless it is there, and removes all but the latest `kept` up to it.
+/// Writes the checkpoint with this number, unless it is there, and removes all but the latest `kept` up to it; where it has no
+/// replay memory, because the run ends with it, also those that have one.
 ///
 /// # Errors
 /// Path, bytes and what the operating system says; earlier checkpoints are intact then.
