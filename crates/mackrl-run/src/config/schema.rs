@@ -212,7 +212,7 @@ mod tests {
             ),
             ("[algorithm]\ngama = 0.5", ".algorithm.gama"),
             ("[run]\nseed = -1", ".run.seed"),
-            ("[algorithm]\nname = \"qmix\"", ".algorithm.name"),
+            ("[algorithm]\nname = \"maddpg\"", ".algorithm.name"),
             ("[env.matrix-game]\npayoffs = 3", ".env.matrix-game.payoffs"),
             ("[env]\nreward_sparse = 1", ".env.reward_sparse"),
         ] {

@@ -64,7 +64,8 @@ pub(super) struct Stored {
     pub(super) weights: Kept,
 }
 
-/// Writes the checkpoint with this number, unless it is there, and removes all but the latest `kept` up to it.
+/// Writes the checkpoint with this number, unless it is there, and removes all but the latest `kept` up to it; where it has no
+/// replay memory, because the run ends with it, also those that have one.
 ///
 /// # Errors
 /// Path, bytes and what the operating system says; earlier checkpoints are intact then.
@@ -96,7 +97,7 @@ pub(super) fn write(
 
 /// Whether an earlier checkpoint has a replay memory and this one, the last of a run, needs none any more: memories are large.
 fn outlives_memory(run: &Folder, checkpoint: &Checkpoint, earlier: u64) -> Result<bool> {
-    Ok(checkpoint.memory.is_none() && run.kind(&place(earlier).join(MEMORY))?.is_some())
+    Ok(checkpoint.memory.is_none() && run.kind(place(earlier).join(MEMORY))?.is_some())
 }
 
 /// Makes a folder of the checkpoint's files and their manifest; what could not be completed is removed again, since a full disk

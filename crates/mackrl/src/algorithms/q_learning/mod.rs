@@ -23,3 +23,4 @@ mod settings;
 pub use acting::ActionValues;
 pub use learner::QLearner;
 pub use settings::QLearningSettings;
+pub(in crate::algorithms) use settings::memory_that_fits;

@@ -1,11 +1,20 @@
 //! The settings of every learner of action values.
 
 use mackrl_env::{
-    declare_settings,
+    EnvironmentSpec, declare_settings,
     settings::{Accepts, EXACT, SettingsError, WrongSetting},
 };
 
-use crate::{algorithms::OptimiserName, nn::OptimiserKind, objectives::ReturnSettings};
+use crate::{
+    algorithms::{Automatic, OptimiserName},
+    nn::OptimiserKind,
+    objectives::ReturnSettings,
+};
+
+/// What plain arrays of all episodes of a memory may take, if each lasts to the time limit. Encoded they take a sixth or less.
+const PLAIN_BYTES_MAX: u64 = 16_000_000_000;
+/// Episodes that are remembered in any world.
+const EPISODES_LEAST: u64 = 1000;
 
 declare_settings! {
     /// Sizes of the networks, how training explores (ε-greedy, with ε falling linearly), and how action values are learnt from
@@ -109,6 +118,29 @@ impl QLearningSettings {
     }
 }
 
+/// A smaller memory, where that of `table` would take many gigabytes in a world of these sizes.
+pub(in crate::algorithms) fn memory_that_fits(
+    table: &toml::Table,
+    spec: &EnvironmentSpec,
+) -> Vec<Automatic> {
+    let numbers = spec.agents * spec.observation_size + spec.state_size;
+    let steps = (spec.episode_limit as u64).saturating_add(1);
+    let bytes = steps.saturating_mul((numbers * size_of::<f32>()) as u64);
+    let fits = (PLAIN_BYTES_MAX / bytes.max(1) / 100 * 100).max(EPISODES_LEAST);
+    let wanted = table
+        .get("memory_episodes")
+        .and_then(toml::Value::as_integer);
+    let value = i64::try_from(fits).unwrap_or(i64::MAX);
+    if wanted.is_none_or(|wanted| wanted <= value) {
+        return Vec::new();
+    }
+    vec![Automatic {
+        name: "memory_episodes",
+        value: value.into(),
+        why: "more episodes of so large a team would take many gigabytes",
+    }]
+}
+
 /// That the first setting is larger than the second.
 fn at_odds((larger, found): (&str, String), (smaller, other): (&str, String)) -> SettingsError {
     let wrong = |name: &str, found: &str, expected| WrongSetting {
@@ -138,6 +170,30 @@ mod tests {
             let found = settings.exploration(steps);
             assert!((found - expected).abs() < 1e-12, "{steps}: {found}");
         }
+    }
+
+    #[test]
+    fn large_teams_remember_fewer_episodes_and_small_ones_what_is_asked_for() {
+        let spec = |agents: usize, observation_size: usize| EnvironmentSpec {
+            name: "a world".to_owned(),
+            agents,
+            entities: 2 * agents,
+            entity_features: 5,
+            position_features: 2,
+            actions: 10,
+            observation_size,
+            state_size: 100,
+            episode_limit: 179,
+            distance_scale: 1.0,
+            statistics: Vec::new(),
+            success: None,
+        };
+        let table = QLearningSettings::defaults();
+        assert_eq!(memory_that_fits(&table, &spec(5, 80)), []);
+        let fewer = memory_that_fits(&table, &spec(27, 285));
+        // 16e9 bytes by 180 steps of 7 795 numbers.
+        assert_eq!(fewer[0].value, toml::Value::Integer(2800));
+        assert_eq!(fewer[0].name, "memory_episodes");
     }
 
     #[test]

@@ -7,7 +7,10 @@ use mackrl_env::{
 
 use crate::{
     Error,
-    algorithms::{Algorithm, AlgorithmKind, Preset, QLearner, QLearningSettings, Team},
+    algorithms::{
+        Algorithm, AlgorithmKind, Automatic, Preset, QLearner, QLearningSettings, Team,
+        q_learning::memory_that_fits,
+    },
     critics::{Monotonic, MonotonicSizes},
     nn::ParameterLayout,
 };
@@ -76,6 +79,10 @@ impl AlgorithmKind for Qmix {
         let mut defaults = QmixSettings::defaults();
         defaults.extend(QLearningSettings::defaults());
         defaults
+    }
+
+    fn automatic(&self, table: &toml::Table, spec: &EnvironmentSpec) -> Vec<Automatic> {
+        memory_that_fits(table, spec)
     }
 
     fn check(

@@ -7,7 +7,10 @@ use mackrl_env::{
 
 use crate::{
     Error, Real,
-    algorithms::{Algorithm, AlgorithmKind, Preset, QLearner, QLearningSettings, Team},
+    algorithms::{
+        Algorithm, AlgorithmKind, Automatic, Preset, QLearner, QLearningSettings, Team,
+        q_learning::memory_that_fits,
+    },
     critics::Mixer,
     nn::Element,
 };
@@ -38,6 +41,10 @@ impl AlgorithmKind for Vdn {
 
     fn defaults(&self) -> toml::Table {
         QLearningSettings::defaults()
+    }
+
+    fn automatic(&self, table: &toml::Table, spec: &EnvironmentSpec) -> Vec<Automatic> {
+        memory_that_fits(table, spec)
     }
 
     fn check(

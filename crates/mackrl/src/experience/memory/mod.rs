@@ -166,8 +166,9 @@ impl ReplayMemory {
         let mut chosen = BTreeSet::new();
         for last in total.saturating_sub(count)..total {
             let bits = u128::from(key.bits(step, Draw::Setup(last)));
-            let index = usize::try_from(bits * (last as u128 + 1) >> 64);
-            if !chosen.insert(index.expect("at most the last")) {
+            // Of 64 random bits and last + 1, the part above 64 bits: uniform in 0..=last.
+            let index = usize::try_from((bits * (last as u128 + 1)) >> 64).unwrap_or(last);
+            if !chosen.insert(index) {
                 chosen.insert(last);
             }
         }
