@@ -94,6 +94,8 @@ start_node() {
         slurmd -D -N node$1 &
         wait" >"$folder/log/node$1.out" 2>&1 &
     echo $! >"$folder/node$1.unshare.pid"
+    # The shell need not tell how it ended.
+    disown
 }
 
 kill_node() {

@@ -204,10 +204,14 @@ fn script(
     let (plan, out) = (path(names.plan)?, path(names.out)?);
     let stem = names.plan.file_stem().unwrap_or_default();
     let name = quoted(&stem.to_string_lossy())?;
+    let runs = match runs {
+        1 => "a run".to_owned(),
+        runs => format!("{runs} runs"),
+    };
     let mut text = format!(
         "#!/bin/sh\n\
-         # {runs} runs, {block} in each array task and {jobs} of these at a time; a run takes {longest_s:.0} s at most on a core of the machine\n\
-         # that measured it. A task that needs more than its time is told {notice} s before, and goes on in another turn.\n\
+         # What is left of the plan: {runs}. An array task makes {block} runs, {jobs} at a time; a run takes {longest_s:.0} s at most on a core\n\
+         # of the machine that measured it. A task that needs more than its time is told {notice} s before, and goes on in another turn.\n\
          #SBATCH --job-name={name} --array={array}\n\
          #SBATCH --nodes=1 --ntasks=1 --cpus-per-task={jobs}\n\
          #SBATCH --time={time}\n",
