@@ -241,7 +241,7 @@ fn script(
          code=$?\n\
          # 75: it was told to stop, has written checkpoints and wants another turn.\n\
          if [ $code -eq 75 ] && [ \"${{SLURM_RESTART_COUNT:-0}}\" -lt 99 ]; then\n    \
-             scontrol requeue \"$SLURM_JOB_ID\" && exit 0\n\
+             scontrol requeue \"${{SLURM_ARRAY_JOB_ID}}_${{SLURM_ARRAY_TASK_ID}}\" && exit 0\n\
          fi\n\
          exit $code\n",
         here = path(names.here)?,
@@ -366,7 +366,7 @@ mod tests {
             "srun --ntasks=1 --cpus-per-task=2 /opt/mackrl sweep 'it'\\''s.toml' --out runs --scratch \"$TMPDIR/x\\\"y\" \\",
             "    --index \"$SLURM_ARRAY_TASK_ID\" --block 2 --jobs 2",
             "if [ $code -eq 75 ] && [ \"${SLURM_RESTART_COUNT:-0}\" -lt 99 ]; then",
-            "    scontrol requeue \"$SLURM_JOB_ID\" && exit 0",
+            "    scontrol requeue \"${SLURM_ARRAY_JOB_ID}_${SLURM_ARRAY_TASK_ID}\" && exit 0",
         ] {
             assert!(made.lines().any(|found| found == line), "{line}\n{made}");
         }
