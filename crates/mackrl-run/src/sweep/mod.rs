@@ -126,9 +126,10 @@ impl Entry {
     /// # Errors
     /// [`RunError::OtherConfiguration`] if the folder holds a run with another configuration.
     pub fn state(&self) -> Result<State> {
-        let mut standings = standings([self]);
-        let standing = standings.pop().expect("one for each entry")?;
-        Ok(standing.state)
+        match standings([self]).pop() {
+            Some(standing) => Ok(standing?.state),
+            None => Ok(State::Waiting),
+        }
     }
 
     fn look(&self) -> Result<Seen> {
