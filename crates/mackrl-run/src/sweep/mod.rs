@@ -165,6 +165,9 @@ impl Entry {
 
     /// The first setting in which the run that is there differs from this one.
     fn first_difference(&self, there: &Config) -> Option<String> {
+        if self.config == *there {
+            return None;
+        }
         let keys = self.config.keys();
         let mut differing = keys.filter(|key| self.config.get(key) != there.get(key));
         differing.next()
