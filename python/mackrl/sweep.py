@@ -119,7 +119,8 @@ def trainable(
     out: str | os.PathLike[str] | None = None,
     program: str = "mackrl",
 ) -> Callable[[Mapping[str, Any]], None]:
-    """A function for Ray Tune that makes a run and reports every row of its metrics.
+    """A function for Ray Tune that makes a run and reports every row of its metrics. Tune wants every metric in every report: those that a row
+    does not have, such as those of tests, keep their latest value.
 
     Which run that is stands in ``index``, or in Tune's configuration: ``{"index": tune.grid_search([0, 1, 2])}``. With
     ``FailureConfig(max_failures=-1)`` a run whose node dies goes on at its last checkpoint on another.
@@ -135,8 +136,14 @@ def trainable(
     def run(config: Mapping[str, Any]) -> None:
         from ray import tune
 
+        latest: Row = {}
+
+        def report(row: Row) -> None:
+            latest.update(row)
+            tune.report(dict(latest))
+
         number = config["index"] if index is None else index
-        make(plan, number, out=out, program=program, folder=folder, report=tune.report)
+        make(plan, number, out=out, program=program, folder=folder, report=report)
 
     run.__name__ = Path(plan).stem
     return run

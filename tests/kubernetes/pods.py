@@ -43,7 +43,7 @@ class Pod:
         script.append(f"mount -t overlay overlay -o lowerdir=/,upperdir={root}/upper,workdir={root}/work {root}/all")
         for path in mounts:
             script.append(f"mkdir -p {root}/all{path} && mount --bind {folder}{path} {root}/all{path}")
-        script.append(f"mount -t proc proc {root}/all/proc && hostname pod{index}")
+        script.append(f"mount -t proc proc {root}/all/proc && mount --rbind /dev {root}/all/dev && hostname pod{index}")
         script.append(f'exec chroot {root}/all "$@"')
         root.mkdir(exist_ok=True)
         inside = ["bash", "-ec", "\n".join(script), "pod", *container["command"]]
@@ -90,7 +90,8 @@ def main(manifest: Path, folder: Path) -> None:
     pods = {index: Pod(container, folder, index) for index in (0, 1)}
     deadline = time.monotonic() + 300
     while not any(run["checkpoint"] and run["where"] and run["where"]["host"] == "pod1" for run in listed()):
-        assert time.monotonic() < deadline and pods[1].process.poll() is None, "the pod makes no checkpoint"
+        assert time.monotonic() < deadline, "the pod makes no checkpoint"
+        assert pods[1].process.poll() is None, pods[1].code()
         time.sleep(0.1)
     print("pod 1 is evicted:", ", ".join(f"{run['name']} {run['state']}" for run in listed()))
     pods[1].evict()

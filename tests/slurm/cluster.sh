@@ -75,12 +75,15 @@ NodeName=node[1-2] NodeAddr=127.0.0.1 Port=[27818-27819] CPUs=$2 RealMemory=2000
 PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE
 CONF
     export SLURM_CONF="$folder/slurm.conf"
+    # The shell need not tell how what it starts has ended: disown.
     munged --force --foreground --key-file="$folder/munge.key" --socket="$folder/munge.socket" --seed-file="$folder/munge.seed" \
         --pid-file="$folder/munge.pid" --log-file="$folder/log/munge" >"$folder/log/munge.out" 2>&1 &
     echo $! >"$folder/munged.pid"
+    disown
     await 30 "the authentication" test -S "$folder/munge.socket"
     slurmctld -D >"$folder/log/controller.out" 2>&1 &
     echo $! >"$folder/slurmctld.pid"
+    disown
     await 30 "the controller" scontrol ping
     start_node 1
     start_node 2
@@ -94,6 +97,7 @@ start_node() {
         slurmd -D -N node$1 &
         wait" >"$folder/log/node$1.out" 2>&1 &
     echo $! >"$folder/node$1.unshare.pid"
+    disown
 }
 
 kill_node() {

@@ -234,10 +234,8 @@ fn a_run_that_is_stopped_on_a_disk_of_the_machine_goes_on_without_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let plan = plan(folder.path(), "\"central-v\"", "1", 1_000_000_000);
     let scratch = folder.path().join("disk");
-    let mut child = sweep(&plan, &["--scratch"])
-        .arg(&scratch)
-        .spawn()
-        .expect("the program starts");
+    let on_disk = ["--scratch", scratch.to_str().expect("a path in UTF-8")];
+    let mut child = sweep(&plan, &on_disk).spawn().expect("the program starts");
     let listed = || json(sweep(&plan, &["--list", "--json"]))[0].clone();
     wait_until(|| listed()["checkpoint"].is_string() && listed()["where"].is_object());
     let place = listed()["where"].clone();

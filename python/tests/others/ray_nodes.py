@@ -13,7 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-os.environ |= {"RAY_USAGE_STATS_ENABLED": "0", "RAY_DEDUP_LOGS": "0", "RAY_CHDIR_TO_TRIAL_DIR": "0", "TUNE_DISABLE_AUTO_CALLBACK_LOGGERS": "1"}
+os.environ |= {"RAY_USAGE_STATS_ENABLED": "0", "RAY_DEDUP_LOGS": "0", "RAY_CHDIR_TO_TRIAL_DIR": "0"}
 
 import ray  # noqa: E402
 from ray import tune  # noqa: E402
@@ -91,6 +91,7 @@ def main() -> None:
     tuner = tune.Tuner(
         mackrl.sweep.trainable(plan, program=PROGRAM),
         param_space={"index": tune.grid_search([0, 1])},
+        # A metric of tests alone, which not every row has.
         tune_config=tune.TuneConfig(metric="test_battle_won_mean", mode="max"),
         run_config=tune.RunConfig(
             storage_path=str(Path("tune").absolute()), failure_config=tune.FailureConfig(max_failures=-1), verbose=0

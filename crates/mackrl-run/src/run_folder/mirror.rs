@@ -4,7 +4,11 @@
 //! at every moment it is a run that can go on anywhere. What a killed process left on this machine's disk is used if it is further than the
 //! shared folder.
 
-use std::{fs, io, path::Path};
+use std::{
+    fs::{self, File},
+    io,
+    path::Path,
+};
 
 use cap_std::fs::OpenOptions;
 
@@ -138,8 +142,10 @@ fn copy_files_in(
         if is_own && kind == Kind::File && is_wanted(&name) {
             let name = inside.join(name);
             let temporary = disk::temporary(&name);
-            copy(from, &name, to, &temporary)?;
-            disk::rename(&RealDisk, to, &temporary, &name)?;
+            if let Some(file) = from.file(&name)? {
+                copy(file, to, &temporary)?;
+                disk::rename(&RealDisk, to, &temporary, &name)?;
+            }
         }
     }
     disk::sync_folder(&RealDisk, to, inside)
@@ -154,21 +160,21 @@ fn copy_checkpoints(from: &Folder, to: &Folder) -> Result<()> {
     }
     for number in wanted.iter().filter(|number| !there.contains(number)) {
         let place = checkpoints::place(*number);
+        // Files that are open can be read to their end, even if the run removes this checkpoint meanwhile.
+        let Some(files) = open_all(from, &place)? else {
+            continue;
+        };
         let temporary = disk::temporary(&place);
         if to.kind(&temporary)?.is_some() {
-            remove(to, &temporary)?;
+            (RealDisk.remove_folder(to, &temporary))
+                .with_context(|| to.cannot("remove", &temporary))?;
         }
         (RealDisk.create_folder(to, &temporary))
             .with_context(|| to.cannot("create", &temporary))?;
-        let copied = (from.entries(&place)?.into_iter())
-            .try_for_each(|(name, _)| copy(from, &place.join(&name), to, &temporary.join(name)));
-        let is_whole = from.kind(&place)?.is_some();
-        match copied {
-            Ok(()) if is_whole => disk::rename(&RealDisk, to, &temporary, &place)?,
-            // The run removed it meanwhile, since it has a later one.
-            _ if !is_whole => remove(to, &temporary)?,
-            copied => copied?,
+        for (name, file) in files {
+            copy(file, to, &temporary.join(name))?;
         }
+        disk::rename(&RealDisk, to, &temporary, &place)?;
     }
     for number in there.iter().filter(|number| !wanted.contains(number)) {
         checkpoints::remove(&RealDisk, to, *number)?;
@@ -179,16 +185,20 @@ fn copy_checkpoints(from: &Folder, to: &Folder) -> Result<()> {
     disk::sync_folder(&RealDisk, to, parent)
 }
 
-fn remove(folder: &Folder, path: &Path) -> Result<()> {
-    (RealDisk.remove_folder(folder, path)).with_context(|| folder.cannot("remove", path))
+/// The files of a checkpoint; nothing, if it is there no more.
+fn open_all(from: &Folder, place: &Path) -> Result<Option<Vec<(String, File)>>> {
+    let mut files = Vec::new();
+    for (name, _) in from.entries(place)? {
+        match from.file(place.join(&name))? {
+            Some(file) => files.push((name, file)),
+            None => return Ok(None),
+        }
+    }
+    Ok((!files.is_empty()).then_some(files))
 }
 
 /// Copies a file and waits until its content is safe.
-fn copy(from: &Folder, name: &Path, to: &Folder, place: &Path) -> Result<()> {
-    let missing = || io::Error::from(io::ErrorKind::NotFound);
-    let mut source = (from.file(name)?)
-        .ok_or_else(missing)
-        .with_context(|| from.cannot("read", name))?;
+fn copy(mut source: File, to: &Folder, place: &Path) -> Result<()> {
     let mut copy = || {
         let mut options = OpenOptions::new();
         let options = options.write(true).create(true).truncate(true);

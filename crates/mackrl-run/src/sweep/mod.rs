@@ -126,9 +126,10 @@ impl Entry {
     /// # Errors
     /// [`RunError::OtherConfiguration`] if the folder holds a run with another configuration.
     pub fn state(&self) -> Result<State> {
-        let mut standings = standings([self]);
-        let standing = standings.pop().expect("one for each entry")?;
-        Ok(standing.state)
+        match standings([self]).pop() {
+            Some(standing) => Ok(standing?.state),
+            None => Ok(State::Waiting),
+        }
     }
 
     fn look(&self) -> Result<Seen> {
@@ -164,6 +165,9 @@ impl Entry {
 
     /// The first setting in which the run that is there differs from this one.
     fn first_difference(&self, there: &Config) -> Option<String> {
+        if self.config == *there {
+            return None;
+        }
         let keys = self.config.keys();
         let mut differing = keys.filter(|key| self.config.get(key) != there.get(key));
         differing.next()

@@ -28,8 +28,8 @@ use crate::{
 
 /// How long is measured, for all kinds of runs together.
 const CALIBRATION: Duration = Duration::from_secs(20);
-/// How long an array task should last at least, in seconds: starting one takes seconds, and a scheduler has others to look after.
-const TASK_S: f64 = 600.0;
+/// How long an array task should last at least: starting one takes seconds, and a scheduler has others to look after.
+const TASK: Duration = Duration::from_secs(600);
 /// Most array tasks: the greatest index that Slurm allows unless it was set up otherwise, and one.
 const TASKS_MAX: usize = 1001;
 /// Nodes differ, and runs side by side share caches: the time limit is so many times what was measured, and so many seconds.
@@ -38,8 +38,8 @@ const TIME_MARGIN: (f64, f64) = (1.5, 300.0);
 const TIME_MAX_S: f64 = 24.0 * 3600.0;
 /// How long before the time limit the runs are told, in seconds, if the limit is not short.
 const NOTICE_S: u64 = 120;
-/// The margin of memory, for all runs of a task together: so many times what was measured, and so many bytes.
-const MEMORY_MARGIN: (f64, u64) = (1.5, 256 << 20);
+/// Memory for an array task beside that of its runs, in bytes.
+const MEMORY_MARGIN: u64 = 256 << 20;
 
 /// Map, algorithm and length: what decides how long a run takes, more than anything else.
 type Kind = (String, String, u64);
@@ -151,7 +151,8 @@ impl Request {
         let jobs = jobs.get();
         let runs = times.last().map_or(1, |(index, _)| index + 1);
         let mean_s = times.iter().map(|(_, time_s)| time_s).sum::<f64>() / times.len() as f64;
-        let rounds = (TASK_S / mean_s.max(1e-3)).ceil().clamp(1.0, runs as f64) as usize;
+        let rounds = TASK.as_millis().div_ceil(whole(mean_s).as_millis().max(1));
+        let rounds = usize::try_from(rounds).unwrap_or(runs).clamp(1, runs);
         let usual = (jobs * rounds).max(runs.div_ceil(TASKS_MAX)).min(runs);
         let block = block.map_or(usual, NonZeroUsize::get);
         let jobs = jobs.min(block);
@@ -164,18 +165,21 @@ impl Request {
         // So long a task takes at most that begins the next run whenever a core is free.
         let task_s = |(sum, longest): &(f64, f64)| sum / jobs as f64 + longest;
         let longest_s = tasks.values().map(task_s).fold(0.0, f64::max);
-        let time_s = (TIME_MARGIN.0 * longest_s + TIME_MARGIN.1).min(TIME_MAX_S) as u64;
+        let time_s = whole(TIME_MARGIN.0 * longest_s + TIME_MARGIN.1).as_secs();
         Self {
             tasks: tasks.into_keys().collect(),
             block,
             jobs,
             time_s: time_s.next_multiple_of(60),
-            memory: memory.map(|memory| {
-                let all = jobs as f64 * memory as f64;
-                (MEMORY_MARGIN.0 * all) as u64 + MEMORY_MARGIN.1
-            }),
+            // Half as much again.
+            memory: memory.map(|memory| jobs as u64 * memory / 2 * 3 + MEMORY_MARGIN),
         }
     }
+}
+
+/// So many seconds, as far as anybody asks for them.
+fn whole(seconds: f64) -> Duration {
+    Duration::from_secs_f64(seconds.clamp(0.0, TIME_MAX_S))
 }
 
 /// What a script names.
@@ -204,10 +208,14 @@ fn script(
     let (plan, out) = (path(names.plan)?, path(names.out)?);
     let stem = names.plan.file_stem().unwrap_or_default();
     let name = quoted(&stem.to_string_lossy())?;
+    let runs = match runs {
+        1 => "a run".to_owned(),
+        runs => format!("{runs} runs"),
+    };
     let mut text = format!(
         "#!/bin/sh\n\
-         # {runs} runs, {block} in each array task and {jobs} of these at a time; a run takes {longest_s:.0} s at most on a core of the machine\n\
-         # that measured it. A task that needs more than its time is told {notice} s before, and goes on in another turn.\n\
+         # What is left of the plan: {runs}. An array task makes {block} runs, {jobs} at a time; a run takes {longest_s:.0} s at most on a core\n\
+         # of the machine that measured it. A task that needs more than its time is told {notice} s before, and goes on in another turn.\n\
          #SBATCH --job-name={name} --array={array}\n\
          #SBATCH --nodes=1 --ntasks=1 --cpus-per-task={jobs}\n\
          #SBATCH --time={time}\n",
@@ -237,7 +245,7 @@ fn script(
          code=$?\n\
          # 75: it was told to stop, has written checkpoints and wants another turn.\n\
          if [ $code -eq 75 ] && [ \"${{SLURM_RESTART_COUNT:-0}}\" -lt 99 ]; then\n    \
-             scontrol requeue \"$SLURM_JOB_ID\" && exit 0\n\
+             scontrol requeue \"${{SLURM_ARRAY_JOB_ID}}_${{SLURM_ARRAY_TASK_ID}}\" && exit 0\n\
          fi\n\
          exit $code\n",
         here = path(names.here)?,
@@ -362,7 +370,7 @@ mod tests {
             "srun --ntasks=1 --cpus-per-task=2 /opt/mackrl sweep 'it'\\''s.toml' --out runs --scratch \"$TMPDIR/x\\\"y\" \\",
             "    --index \"$SLURM_ARRAY_TASK_ID\" --block 2 --jobs 2",
             "if [ $code -eq 75 ] && [ \"${SLURM_RESTART_COUNT:-0}\" -lt 99 ]; then",
-            "    scontrol requeue \"$SLURM_JOB_ID\" && exit 0",
+            "    scontrol requeue \"${SLURM_ARRAY_JOB_ID}_${SLURM_ARRAY_TASK_ID}\" && exit 0",
         ] {
             assert!(made.lines().any(|found| found == line), "{line}\n{made}");
         }
