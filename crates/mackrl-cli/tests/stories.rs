@@ -232,18 +232,18 @@ fn a_setting_is_explained_with_its_value_everywhere() {
     algorithm.lambda
       λ of the generalised advantages: 0 looks one step ahead, 1 to the end of the episode.
       takes              a number in [0, 1]
-      built-in           0.95
-      preset default     0.95  of the generalised advantages
+      built-in           0.9
+      preset default     0.9  of the generalised advantages
       preset fours       0.8
-      preset paper       0.8   "TD-lambda of 0.8"
+      preset paper       0.8  "TD-lambda of 0.8"
       preset paper-code  0.8
       preset paper-figures  0.8
-      preset pymarl-iql  0.95  td_lambda: targets look one step ahead
-      preset pymarl-vdn  0.95  td_lambda: targets look one step ahead
-      preset pymarl-qmix  0.95  td_lambda: targets look one step ahead
-      preset pymarl2-qmix  0.95  td_lambda
-      preset pymarl-coma  0.95  td_lambda
-      here               0.5   --set algorithm.lambda=0.5
+      preset pymarl-iql  0.9  td_lambda: targets look one step ahead
+      preset pymarl-vdn  0.9  td_lambda: targets look one step ahead
+      preset pymarl-qmix  0.9  td_lambda: targets look one step ahead
+      preset pymarl2-qmix  0.9  td_lambda
+      preset pymarl-coma  0.9  td_lambda
+      here               0.5  --set algorithm.lambda=0.5
     "#);
     let section = type_in("config --explain test --json").succeeds();
     let section: Vec<serde_json::Value> = serde_json::from_str(&section).expect("a JSON array");

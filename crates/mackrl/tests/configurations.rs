@@ -31,6 +31,8 @@ const COMBINED: &[&str] = &[
     "env.sight_range",
     "algorithm.partitions",
     "algorithm.hold_steps_env",
+    "algorithm.minibatches",
+    "algorithm.shards",
     "algorithm.memory_episodes",
     "algorithm.minibatch_episodes",
 ];

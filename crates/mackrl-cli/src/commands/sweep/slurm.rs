@@ -363,7 +363,7 @@ mod tests {
         for line in [
             "#SBATCH --job-name='it'\\''s' --array=0-1",
             "#SBATCH --nodes=1 --ntasks=1 --cpus-per-task=2",
-            "#SBATCH --time=00:09:00",
+            "#SBATCH --time=00:08:00",
             "#SBATCH --mem=286M",
             "#SBATCH --chdir='/home/a b'",
             "#SBATCH --requeue --open-mode=append --signal=USR1@120",
