@@ -19,6 +19,7 @@ const COSTLY: &[(&str, u64)] = &[
     ("algorithm.mixing_hidden", 5),
     ("algorithm.hypernetwork_hidden", 5),
     ("algorithm.minibatches", 3),
+    ("algorithm.minibatch_episodes", 3),
     ("test.episodes", 2),
     ("run.steps_env", 3),
 ];
