@@ -7,7 +7,7 @@
 mod engine;
 mod plan;
 
-use std::path::PathBuf;
+use std::{path::PathBuf, thread};
 
 use serde::Serialize;
 
@@ -18,6 +18,9 @@ use crate::{
 };
 pub use engine::{Making, Observer, Outcome, make_all};
 pub use plan::Plan;
+
+/// Runs that are looked at side by side: a disk that many machines share answers late, and to many questions at once.
+const LOOKS: usize = 16;
 
 /// One run of a sweep.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,7 +86,7 @@ impl Standing {
 
 /// How these runs stand. A batch system is asked once, for all that are made in jobs of it on other machines.
 pub fn standings<'a>(entries: impl IntoIterator<Item = &'a Entry>) -> Vec<Result<Standing>> {
-    let seen: Vec<Result<Seen>> = entries.into_iter().map(Entry::look).collect();
+    let seen = look_at(&entries.into_iter().collect::<Vec<_>>());
     let occupation = |seen: &Result<Seen>| match seen {
         Ok(Seen { occupation, .. }) => occupation.clone(),
         Err(_) => Occupation::Free,
@@ -92,6 +95,19 @@ pub fn standings<'a>(entries: impl IntoIterator<Item = &'a Entry>) -> Vec<Result
     let both = seen.into_iter().zip(occupations);
     both.map(|(seen, occupation)| Ok(seen?.standing(occupation)))
         .collect()
+}
+
+/// Looks at these runs, in their order, several at a time.
+fn look_at(entries: &[&Entry]) -> Vec<Result<Seen>> {
+    let own = entries.len().div_ceil(LOOKS).max(1);
+    thread::scope(|scope| {
+        let looks: Vec<_> = (entries.chunks(own))
+            .map(|own| scope.spawn(|| own.iter().map(|entry| entry.look()).collect::<Vec<_>>()))
+            .collect();
+        let seen = looks.into_iter().map(|look| look.join());
+        seen.flat_map(|seen| seen.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+            .collect()
+    })
 }
 
 /// What can be seen of a run without asking a batch system.
