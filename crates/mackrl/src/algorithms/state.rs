@@ -4,9 +4,13 @@ use std::collections::BTreeMap;
 
 use crate::{
     Error,
+    critics::CriticState,
     experience::MemoryState,
     nn::{Moments, OptimiserKind, ParameterLayout},
 };
+
+/// How the names of a target critic's tensors begin.
+const TARGET: &str = "target.";
 
 /// Everything that an algorithm's future depends on.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -17,6 +21,14 @@ pub struct AlgorithmState {
     pub counters: BTreeMap<String, u64>,
     /// What a replay memory holds, if there is one.
     pub memory: Option<MemoryState>,
+}
+
+/// The policy of an actor-critic, as a checkpoint holds it.
+#[derive(Debug)]
+pub(crate) struct PolicyState {
+    pub(crate) parameters: Vec<f32>,
+    pub(crate) moments: Moments<f32>,
+    pub(crate) updates: u64,
 }
 
 /// A state that was stored.
@@ -69,6 +81,55 @@ impl AlgorithmState {
         }
         self.add_counter(&format!("{name}.optimiser_steps"), moments.steps);
     }
+}
+
+impl AlgorithmState {
+    /// Of a policy and its critic, whose tensors the layouts name in this order.
+    pub(crate) fn of_actor_critic(
+        kind: OptimiserKind,
+        [layout, critic_layout]: [&ParameterLayout; 2],
+        (parameters, moments, updates): (&[f32], &Moments<f32>, u64),
+        critic: &CriticState,
+    ) -> Self {
+        let mut state = Self::default();
+        state.add_tensors(layout, parameters);
+        state.add_tensors(critic_layout, &critic.parameters);
+        let target = critic_layout.prefixed(TARGET);
+        state.add_tensors(&target, &critic.target_parameters);
+        state.add_moments("policy", kind, layout, moments);
+        state.add_moments("critic", kind, critic_layout, &critic.moments);
+        state.add_counter("policy.updates", updates);
+        state.add_counter("critic.updates", critic.updates);
+        state.add_counter("critic.updates_at_refresh", critic.updates_at_refresh);
+        state
+    }
+}
+
+/// What [`AlgorithmState::of_actor_critic`] stored.
+pub(crate) fn read_actor_critic(
+    stored: &dyn StoredState,
+    kind: OptimiserKind,
+    [layout, critic_layout]: [&ParameterLayout; 2],
+) -> Result<(PolicyState, CriticState), Error> {
+    let policy = PolicyState {
+        parameters: stored.tensors(layout)?,
+        moments: read_moments(stored, "policy", kind, layout)?,
+        updates: stored.counter("policy.updates")?,
+    };
+    let critic = CriticState {
+        parameters: stored.tensors(critic_layout)?,
+        target_parameters: stored.tensors(&critic_layout.prefixed(TARGET))?,
+        moments: read_moments(stored, "critic", kind, critic_layout)?,
+        updates: stored.counter("critic.updates")?,
+        updates_at_refresh: stored.counter("critic.updates_at_refresh")?,
+    };
+    if critic.updates_at_refresh > critic.updates {
+        return Err(Error::Data(format!(
+            "the target critic was refreshed after {} updates, expected at most {}",
+            critic.updates_at_refresh, critic.updates
+        )));
+    }
+    Ok((policy, critic))
 }
 
 /// What [`AlgorithmState::add_moments`] stored.

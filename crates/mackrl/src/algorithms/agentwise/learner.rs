@@ -7,9 +7,9 @@ use mackrl_env::{EnvironmentSpec, EpisodeKey, Stream};
 use super::{Advantage, AgentwiseSettings, Judge};
 use crate::{
     Error, NotFinite, Phase, Real, Stopwatch,
-    algorithms::{Algorithm, AlgorithmState, StoredState, Team, state::read_moments},
+    algorithms::{Algorithm, AlgorithmState, StoredState, Team, state::read_actor_critic},
     common_knowledge::CommonKnowledgeFeatures,
-    critics::{CriticState, MemberCritic, MemberCriticSettings, MemberRows},
+    critics::{MemberCritic, MemberCriticSettings, MemberRows},
     experience::{Episode, Piece},
     hierarchy::{Factor, FactorWorkspace, Hierarchy, HierarchySettings, NetworkStyle, Weighing},
     nn::{Optimiser, ParameterLayout, finite_step, first_not_finite},
@@ -392,44 +392,22 @@ impl<J: Judge> Algorithm for Agentwise<J> {
     }
 
     fn state(&self) -> AlgorithmState {
-        let (layout, critic_layout) = (self.hierarchy.layout(), self.critic.layout());
-        let (kind, critic) = (self.settings.optimiser(), self.critic.state());
-        let mut state = AlgorithmState::default();
-        state.add_tensors(layout, self.parameters.values());
-        state.add_tensors(critic_layout, &critic.parameters);
-        let target = critic_layout.prefixed("target.");
-        state.add_tensors(&target, &critic.target_parameters);
-        state.add_moments("policy", kind, layout, self.optimiser.moments());
-        state.add_moments("critic", kind, critic_layout, &critic.moments);
-        state.add_counter("policy.updates", self.updates);
-        state.add_counter("critic.updates", critic.updates);
-        state.add_counter("critic.updates_at_refresh", critic.updates_at_refresh);
-        state
+        let parameters = self.parameters.values();
+        AlgorithmState::of_actor_critic(
+            self.settings.optimiser(),
+            [self.hierarchy.layout(), self.critic.layout()],
+            (parameters, self.optimiser.moments(), self.updates),
+            &self.critic.state(),
+        )
     }
 
     fn restore(&mut self, stored: &dyn StoredState) -> Result<(), Error> {
-        let (layout, critic_layout) = (self.hierarchy.layout(), self.critic.layout());
-        let kind = self.settings.optimiser();
-        let parameters = stored.tensors(layout)?;
-        let moments = read_moments(stored, "policy", kind, layout)?;
-        let updates = stored.counter("policy.updates")?;
-        let critic = CriticState {
-            parameters: stored.tensors(critic_layout)?,
-            target_parameters: stored.tensors(&critic_layout.prefixed("target."))?,
-            moments: read_moments(stored, "critic", kind, critic_layout)?,
-            updates: stored.counter("critic.updates")?,
-            updates_at_refresh: stored.counter("critic.updates_at_refresh")?,
-        };
-        if critic.updates_at_refresh > critic.updates {
-            return Err(Error::Data(format!(
-                "the target critic was refreshed after {} updates, expected at most {}",
-                critic.updates_at_refresh, critic.updates
-            )));
-        }
-        self.parameters = Parameters::new(parameters);
-        self.optimiser.restore(moments);
+        let layouts = [self.hierarchy.layout(), self.critic.layout()];
+        let (policy, critic) = read_actor_critic(stored, self.settings.optimiser(), layouts)?;
+        self.parameters = Parameters::new(policy.parameters);
+        self.optimiser.restore(policy.moments);
         self.critic.restore(critic);
-        self.updates = updates;
+        self.updates = policy.updates;
         Ok(())
     }
 
