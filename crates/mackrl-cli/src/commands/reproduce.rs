@@ -9,6 +9,7 @@ use crate::{
     output,
     progress::Meter,
     reproduce::{ablations, all, figure5, figure6, figure7, ppo, protocol, zoo},
+    signals,
 };
 
 pub(crate) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
@@ -26,8 +27,11 @@ pub(crate) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
 }
 
 fn figure5(options: &figure5::Figure5Options) -> anyhow::Result<()> {
-    let meter = Meter::new("runs");
-    let report = figure5::run(options, &|done, total| meter.report(done, total))?;
+    let (meter, stop) = (Meter::new("runs"), signals::listen()?);
+    let report = figure5::run(options, &|done, total| {
+        signals::end_if_asked(&stop, "figure 5");
+        meter.report(done, total);
+    })?;
     print(&report, options.json)
 }
 

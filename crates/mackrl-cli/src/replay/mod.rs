@@ -12,7 +12,7 @@ use mackrl_run::{
 };
 
 use crate::failure::Failure;
-pub(crate) use explanation::Explanation;
+pub(crate) use explanation::{About, Explanation};
 pub(crate) use picture::picture;
 
 /// A replay that was opened and played again.

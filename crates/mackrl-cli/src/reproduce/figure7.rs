@@ -47,6 +47,8 @@ pub(crate) static FIGURE: Figure = Figure {
     claims: &[
         Statement {
             claim: "At the beginning of training, the pair controller delegates only rarely",
+            // The first batch is that of an untrained team, however long the run.
+            needs: (5, 1_000),
             rule: Rule::Delegates {
                 moment: 0,
                 enemies: &[0, 1, 2, 3, 4, 5],

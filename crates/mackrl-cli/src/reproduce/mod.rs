@@ -22,7 +22,7 @@ use mackrl_run::run_folder;
 use serde::Serialize;
 
 use crate::plot::{LineChart, SmallMultiples};
-pub(crate) use claim::{Claim, ClaimSource, write_verdicts};
+pub(crate) use claim::{Claim, ClaimSource, Verdict, write_verdicts};
 
 /// A drawing.
 pub(crate) enum Chart {

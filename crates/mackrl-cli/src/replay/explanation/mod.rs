@@ -1,5 +1,6 @@
 //! Who knew what at one step, and what the controllers made of it, in names that people read.
 
+mod only;
 mod text;
 
 use mackrl::policy::{GroupChoice, PairThought, Thought};
@@ -8,6 +9,10 @@ use mackrl_run::replay::{GroupKnowledge, Summary};
 use serde::Serialize;
 
 use super::Opened;
+pub(crate) use only::About;
+
+/// How the choice of a partition is called among controllers.
+const PARTITION: &str = "partition";
 
 /// The facts of one step.
 #[derive(Debug, Serialize)]
@@ -23,7 +28,7 @@ pub(crate) struct Explanation {
     views: Vec<View>,
     /// What every pair of living agents knows.
     knowledge: Vec<Knowledge>,
-    /// What everybody did.
+    /// What every agent did.
     actions: Vec<Taken>,
     /// What the controllers computed, if there are any.
     controllers: Option<Controllers>,
@@ -298,7 +303,7 @@ impl Writer<'_> {
         let mut path = Vec::new();
         let chosen = thought.chosen.map(|index| &thought.partitions[index]);
         path.extend(chosen.map(|partition| Chosen {
-            controller: "partition".to_owned(),
+            controller: PARTITION.to_owned(),
             choice: self.groups(&partition.groups),
             probability: partition.probability,
         }));

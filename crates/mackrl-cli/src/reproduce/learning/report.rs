@@ -162,7 +162,7 @@ impl Report {
             seeds: options.seeds,
             steps: options.steps_of(tests),
             claims: (figure.claims.iter())
-                .map(|statement| statement.judge(&groups, &body))
+                .map(|statement| statement.judge(&groups, &body, options.steps))
                 .collect(),
             body,
         }
@@ -269,7 +269,7 @@ impl Variant {
 
 impl Versus {
     fn new(own: &[f64], mackrl: &[f64]) -> Self {
-        let Difference { mean, error } = Difference::between(own, mackrl);
+        let Difference { mean, error, .. } = Difference::between(own, mackrl);
         let both = [own.to_vec(), mackrl.to_vec()];
         Self {
             difference: mean,

@@ -61,7 +61,7 @@ pub(crate) struct PpoOptions {
     as_it_stands: bool,
 
     /// Runs side by side, each on one thread; changes no result [default: one for each processor]
-    #[arg(long, value_name = "K", conflicts_with = "as_it_stands")]
+    #[arg(long, value_name = "K", value_parser = crate::args::side_by_side, conflicts_with = "as_it_stands")]
     jobs: Option<NonZeroUsize>,
 
     /// Print JSON instead of a table

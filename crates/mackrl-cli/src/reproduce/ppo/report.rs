@@ -11,11 +11,11 @@ use mackrl_run::{
 use serde::Serialize;
 
 use super::runs::{Cell, Kept};
-use crate::reproduce::{Claim, ClaimSource, learning::Difference};
+use crate::reproduce::{Claim, ClaimSource, Verdict, learning::Difference};
 
 /// Shares of battles until which steps are counted.
 const LEVELS: [f64; 2] = [0.7, 0.9];
-/// Runs of each of two learners from which on a claim about them is judged: two standard errors of fewer say nothing.
+/// Runs of each of two learners from which on a claim about them is judged: intervals of fewer say nothing.
 const RUNS_LEAST: usize = 3;
 /// The learner that is asked about, and those that it is held against.
 const OURS: &str = "mackrl-ppo";
@@ -32,8 +32,6 @@ pub(crate) struct Report {
     /// Learners on maps, in the order of the plan.
     pub(super) rows: Vec<Row>,
     pub(super) claims: Vec<Claim>,
-    /// Claims for which there are too few runs.
-    pub(super) not_judged: Vec<String>,
 }
 
 /// A learner on a map.
@@ -72,14 +70,12 @@ impl Report {
     pub(super) fn new(cells: &[Cell]) -> Self {
         let runs = cells.iter().flat_map(|cell| &cell.runs);
         let runs: Vec<TrainingRun> = runs.map(|kept| kept.run.clone()).collect();
-        let (claims, not_judged) = claims(cells);
         Self {
             provenance: TrainingRun::provenance_of(&runs),
             finished: runs.len(),
             planned: cells.iter().map(|cell| cell.planned).sum(),
             rows: cells.iter().map(Row::new).collect(),
-            claims,
-            not_judged,
+            claims: claims(cells),
         }
     }
 }
@@ -242,9 +238,9 @@ const STATEMENTS: [Statement; 3] = [
     },
 ];
 
-/// The verdicts, and the claims for which runs are lacking.
-fn claims(cells: &[Cell]) -> (Vec<Claim>, Vec<String>) {
-    let (mut claims, mut not_judged) = (Vec::new(), Vec::new());
+/// The verdicts.
+fn claims(cells: &[Cell]) -> Vec<Claim> {
+    let mut claims = Vec::new();
     let named = |maps: &[&str]| match maps {
         [] => "none".to_owned(),
         maps => maps.join(", "),
@@ -260,26 +256,32 @@ fn claims(cells: &[Cell]) -> (Vec<Claim>, Vec<String>) {
             } = statement;
             let claim = format!("MACKRL-PPO {words} {} on {maps}", duel.other.to_uppercase());
             if duel.maps.is_empty() || !duel.lacking.is_empty() {
-                let lacking = named(&duel.lacking);
-                not_judged.push(format!(
-                    "{claim} (fewer than {RUNS_LEAST} runs of each on {lacking})"
-                ));
+                let there = match &duel.lacking[..] {
+                    [] => "the plan has none of one of them".to_owned(),
+                    lacking => format!("there are fewer on {}", lacking.join(", ")),
+                };
+                claims.push(Claim {
+                    claim,
+                    source: ClaimSource::Reproduction,
+                    verdict: Verdict::NotTested,
+                    evidence: format!("Needs {RUNS_LEAST} runs of each on every map; {there}."),
+                });
                 continue;
             }
             let (differences, ahead, behind) = duel.differences(score);
             claims.push(Claim {
                 claim,
                 source: ClaimSource::Reproduction,
-                holds: holds(ahead.len(), behind.len()),
+                verdict: Verdict::of(holds(ahead.len(), behind.len())),
                 evidence: format!(
-                    "{measured}, difference: {differences}; ahead on {}, behind on {}, by more than two standard errors.",
+                    "{measured}, difference: {differences}; ahead on {}, behind on {}, where the 95 % interval does not reach 0.",
                     named(&ahead),
                     named(&behind)
                 ),
             });
         }
     }
-    (claims, not_judged)
+    claims
 }
 
 #[cfg(test)]
@@ -332,12 +334,20 @@ mod tests {
         };
         let verdicts = |ours: &[f64]| -> Vec<bool> {
             let report = Report::new(&cells(ours));
-            report.claims.iter().map(|claim| claim.holds).collect()
+            (report.claims.iter())
+                .map(|claim| claim.verdict == Verdict::Holds)
+                .collect()
         };
         assert_eq!(verdicts(&low), [true, false, true, false, false, false]);
         assert_eq!(verdicts(&high), [true, true, true, true, false, true]);
         let few = Report::new(&cells(&low[..2]));
-        assert_eq!((few.claims.len(), few.not_judged.len()), (0, 6));
-        assert!(few.not_judged[0].contains("fewer than 3 runs of each on 3m"));
+        assert_eq!(few.claims.len(), 6);
+        for claim in &few.claims {
+            assert_eq!(claim.verdict, Verdict::NotTested, "{}", claim.claim);
+            assert!(
+                claim.evidence.ends_with("there are fewer on 3m."),
+                "{claim:?}"
+            );
+        }
     }
 }

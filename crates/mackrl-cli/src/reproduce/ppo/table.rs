@@ -29,17 +29,14 @@ impl Report {
 
     /// The table, the verdicts and what made the runs, in Markdown.
     pub(super) fn markdown(&self) -> String {
-        let verdict = |holds: bool| if holds { "holds" } else { "does not hold" };
         let claims = self.claims.iter().map(|claim| {
             format!(
                 "- **{}**: {}. {}\n",
-                verdict(claim.holds),
+                claim.verdict.words(),
                 claim.claim,
                 claim.evidence
             )
         });
-        let not_judged = self.not_judged.iter();
-        let not_judged = not_judged.map(|claim| format!("- **not judged**: {claim}\n"));
         let versions = self.provenance.first().map(|one| one.versions.to_string());
         format!(
             "{}\n{} of {} runs, made by {}.\n\n{}",
@@ -47,7 +44,7 @@ impl Report {
             self.finished,
             self.planned,
             versions.unwrap_or_default(),
-            claims.chain(not_judged).collect::<String>()
+            claims.collect::<String>()
         )
     }
 }
@@ -58,9 +55,7 @@ impl Display for Report {
         let rows = [vec![heading], self.cells()].concat();
         writeln!(formatter, "{}", output::table(&rows))?;
         writeln!(formatter, "{} of {} runs\n", self.finished, self.planned)?;
-        write_verdicts(formatter, &self.claims)?;
-        let mut not_judged = self.not_judged.iter();
-        not_judged.try_for_each(|claim| writeln!(formatter, "  not judged     ours   {claim}"))
+        write_verdicts(formatter, &self.claims)
     }
 }
 

@@ -65,7 +65,7 @@ pub(crate) struct ZooOptions {
     maps: Vec<String>,
 
     /// Environment steps of every team [default: 300 000 on 3m, 3 million on MMM and MMM2, between these elsewhere]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = crate::args::number(1, crate::args::MOST))]
     steps: Option<u64>,
 
     /// Seed of every team
@@ -89,7 +89,7 @@ pub(crate) struct ZooOptions {
     set: Vec<String>,
 
     /// Runs side by side, each on one thread; changes no result [default: one for each processor]
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", value_parser = crate::args::side_by_side)]
     jobs: Option<NonZeroUsize>,
 
     /// Print JSON instead of a table

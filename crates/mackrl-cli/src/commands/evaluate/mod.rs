@@ -1,5 +1,9 @@
 //! `mackrl evaluate`: how well a trained team plays.
 
+mod elsewhere;
+mod episodes;
+mod table;
+
 use std::{
     io::{self, Write},
     path::Path,
@@ -12,10 +16,11 @@ use mackrl_run::{
     provenance::{Choice, Judgement, Provenance},
     replay::record_policy,
     run_folder::{self, REPLAYS, Run, WhichWeights, read_description},
-    training::{Episodes, Evaluation, Score, evaluate_in},
+    training::{EpisodeResult, Episodes, Evaluation, Score, evaluate_each},
 };
 use serde::Serialize;
 
+use self::episodes::EpisodesFile;
 use crate::{
     args::EvaluateArgs,
     commands::sc2,
@@ -28,7 +33,8 @@ use crate::{
 /// Plays greedy episodes with a trained team and prints how it did.
 pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     let which = args.weights.checkpoint;
-    let run = Run::open(&args.run, which)?;
+    let mut run = Run::open(&args.run, which)?;
+    let trained_on = run.config.env.map().to_owned();
     let seed = args.seed.unwrap_or(run.config.run.seed);
     let episodes = args.episodes.get();
     let threads = args.threads.count();
@@ -50,10 +56,37 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
         count: episodes,
         seed,
     };
-    let world = sc2::world(&run.config)?;
-    let evaluation = evaluate_in(&world, &run.config, &run.weights, chosen, threads)
-        .with_context(|| format!("cannot evaluate {}", args.run.display()))?;
-    save_replays(&args.run, &run, which, seed, args.save_replays)?;
+    let world = match &args.map {
+        Some(map) => {
+            let (config, world) = elsewhere::elsewhere(&args.run, &run.config, map)?;
+            run.config = config;
+            world
+        }
+        None => sc2::world(&run.config)?,
+    };
+    let mut rows = match &args.episodes_out {
+        Some(file) => Some(EpisodesFile::create(file, seed)?),
+        None => None,
+    };
+    let mut each = |result: &EpisodeResult<'_>| {
+        if let Some(rows) = &mut rows {
+            rows.add(result);
+        }
+    };
+    let evaluation = evaluate_each(
+        &world,
+        &run.config,
+        &run.weights,
+        chosen,
+        threads,
+        &mut each,
+    )
+    .with_context(|| format!("cannot evaluate {}", args.run.display()))?;
+    if let Some(rows) = rows {
+        rows.end()?;
+    }
+    let name = name_of_replays(args, &run);
+    save_replays(&args.run, &run, &name, seed, args.save_replays)?;
     let judgement = Judgement {
         actions: Choice::Greedy,
         episodes,
@@ -62,10 +95,11 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     let evaluated = Evaluated {
         checkpoint: which,
         trained_steps_env: run.steps_env(),
+        trained_on: args.map.as_ref().map(|_| trained_on.as_str()),
         evaluation: &evaluation,
     };
     print(provenance, &evaluated, args.json)?;
-    if which == WhichWeights::Last {
+    if which == WhichWeights::Last && args.map.is_none() {
         note_better(&args.run);
     }
     Ok(())
@@ -78,7 +112,7 @@ fn note_better(folder: &Path) {
         return;
     };
     if let Some(best) = teams.better() {
-        // The result is the same whether anybody reads this or not.
+        // The result is the same whether this can be written or not.
         let _ = writeln!(
             io::stderr(),
             "note: when the run ended its best weights, of step {}, {}, and the last {}: evaluate those with --checkpoint best",
@@ -95,26 +129,32 @@ struct Evaluated<'a> {
     checkpoint: WhichWeights,
     /// Environment steps that the weights had seen, if they say so.
     trained_steps_env: Option<u64>,
+    /// The map of training, if the team played on another.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    trained_on: Option<&'a str>,
     #[serde(flatten)]
     evaluation: &'a Evaluation,
 }
 
+/// What the names of replays begin with: the map and the weights, where they are not the run's own and not the last.
+fn name_of_replays(args: &EvaluateArgs, run: &Run) -> String {
+    let map = Path::new(run.config.env.map()).file_stem();
+    let map = map
+        .map(|stem| stem.to_string_lossy())
+        .filter(|_| args.map.is_some());
+    let map = map.map_or_else(String::new, |map| format!("{map}-"));
+    match args.weights.checkpoint {
+        WhichWeights::Last => map,
+        other => format!("{map}{other}-"),
+    }
+}
+
 /// Plays the first `count` of the episodes again and keeps them.
-fn save_replays(
-    folder: &Path,
-    run: &Run,
-    which: WhichWeights,
-    seed: u64,
-    count: usize,
-) -> anyhow::Result<()> {
+fn save_replays(folder: &Path, run: &Run, of: &str, seed: u64, count: usize) -> anyhow::Result<()> {
     if count == 0 {
         return Ok(());
     }
     let meter = Meter::new("replays");
-    let of = match which {
-        WhichWeights::Last => String::new(),
-        other => format!("{other}-"),
-    };
     for episode in 0..count {
         let key = EpisodeKey::new(seed, Stream::Evaluation, episode as u64);
         let replay = record_policy(&run.config, &run.weights, Behaviour::GREEDY, key)
@@ -123,17 +163,21 @@ fn save_replays(
         run_folder::keep_replay(folder, &name, &replay.to_bytes())?;
         meter.report(episode + 1, count);
     }
-    // The replays are there, whether anybody reads this or not.
+    // The replays are there, whether this can be written or not.
     let _ = writeln!(
         io::stderr(),
-        "{count} replays are in {}: see `mackrl replay FILE --html OUT`",
+        "{} in {}: see `mackrl replay FILE --html OUT`",
+        if count == 1 {
+            "1 replay is".to_owned()
+        } else {
+            format!("{count} replays are")
+        },
         printable(&folder.join(REPLAYS).display().to_string())
     );
     Ok(())
 }
 
-/// Prints an evaluation: a JSON object of numbers and their provenance, or a sentence and a table in which each mean stands beside
-/// its standard error.
+/// Prints an evaluation: a JSON object of all numbers and their provenance, or a sentence and a table.
 fn print(provenance: Provenance, evaluated: &Evaluated<'_>, json: bool) -> anyhow::Result<()> {
     if json {
         return output::print_json(&Sourced {
@@ -144,75 +188,21 @@ fn print(provenance: Provenance, evaluated: &Evaluated<'_>, json: bool) -> anyho
     let Evaluated {
         checkpoint,
         trained_steps_env,
+        trained_on,
         evaluation,
     } = evaluated;
     let measure = evaluation.quantities.first();
     let measure = measure.map_or("", |quantity| &quantity.name);
     let score = Score::of(evaluation, trained_steps_env.unwrap_or_default());
+    let map = &provenance.map;
+    let place = trained_on.map_or_else(String::new, |trained| {
+        format!(" on {map}; trained on {trained}")
+    });
     let step = match (checkpoint, trained_steps_env) {
         (WhichWeights::Step(_), Some(steps)) => format!("weights of step {steps}"),
         (which, Some(steps)) => format!("{which} weights, of step {steps}"),
         (which, None) => format!("{which} weights"),
     };
-    let text = format!("{} ({step})\n\n", did(measure, &score));
-    output::print(&(text + &table(evaluation)))
-}
-
-/// One line for each number: what the world counts in the order in which it counts it, then what the controllers did.
-fn table(evaluation: &Evaluation) -> String {
-    let quantities = evaluation.quantities.iter().map(|quantity| {
-        vec![
-            format!("test_{}_mean", quantity.name),
-            format!("{:.4}", quantity.mean),
-            format!("± {:.4}", quantity.standard_error),
-        ]
-    });
-    let mut controllers: Vec<(&String, &f64)> = evaluation.controllers.iter().collect();
-    controllers.sort_by_key(|(name, _)| numbered(name));
-    let controllers = controllers.into_iter();
-    let controllers = controllers.map(|(name, mean)| vec![name.clone(), format!("{mean:.4}")]);
-    output::table(&quantities.chain(controllers).collect::<Vec<_>>())
-}
-
-/// A name, and the number that it ends with: 2 comes before 10.
-fn numbered(name: &str) -> (&str, Option<u64>) {
-    let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
-    (stem, name[stem.len()..].parse().ok())
-}
-
-#[cfg(test)]
-mod tests {
-    use mackrl_run::training::Quantity;
-
-    use super::*;
-
-    #[test]
-    fn a_mean_stands_beside_its_standard_error_and_numbers_are_in_order() {
-        let quantity = |name: &str, mean, standard_error| Quantity {
-            name: name.to_owned(),
-            mean,
-            standard_error,
-        };
-        let rates = [
-            ("mackrl/rate_10", 0.5),
-            ("mackrl/rate_2", 0.25),
-            ("mackrl/a", 1.0),
-        ];
-        let evaluation = Evaluation {
-            episodes: 320,
-            distinct_openings: 0.5,
-            quantities: vec![
-                quantity("battle_won", 0.9375, 0.013_64),
-                quantity("ep_length", 25.5, 0.25),
-            ],
-            controllers: rates.map(|(name, rate)| (name.to_owned(), rate)).into(),
-        };
-        insta::assert_snapshot!(table(&evaluation), @r"
-        test_battle_won_mean   0.9375  ± 0.0136
-        test_ep_length_mean   25.5000  ± 0.2500
-        mackrl/a               1.0000
-        mackrl/rate_2          0.2500
-        mackrl/rate_10         0.5000
-        ");
-    }
+    let text = format!("{} ({step}{place})\n\n", did(measure, &score));
+    output::print(&(text + &table::table(evaluation)))
 }
