@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-/// Look into a replay: a page for the browser, a picture of a step
+/// Look into a replay: a page for the browser, a picture of a step, a film
 ///
 /// Plays the episode again and compares every state with the recording; what is shown is what happened. Without an output it
 /// says how the episode went. `mackrl play --save-replay` and `mackrl evaluate --save-replays` write replays.
@@ -16,6 +16,7 @@ use clap::Args;
 /// Examples:
 ///   mackrl replay battle.replay.gz --html battle.html
 ///   mackrl replay battle.replay.gz --svg battle.svg --step 12 --group A,B
+///   mackrl replay battle.replay.gz --gif battle.gif --group A,B
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct ReplayArgs {
@@ -31,7 +32,11 @@ pub(crate) struct ReplayArgs {
     #[arg(long, value_name = "OUT")]
     pub(crate) svg: Option<PathBuf>,
 
-    /// Steps that have passed in what is drawn or shown first: 0 is the start [default: half of the episode; 0 in pages]
+    /// Draw the whole battle as an animated GIF of eight seconds; long battles take longer
+    #[arg(long, value_name = "OUT")]
+    pub(crate) gif: Option<PathBuf>,
+
+    /// Decision that is drawn or shown first: 0 is the first, as in `explain` [default: half of the episode; 0 in pages]
     #[arg(long, value_name = "T")]
     pub(crate) step: Option<usize>,
 

@@ -21,7 +21,6 @@ fn chart(mark: Mark, half_width: f64) -> LineChart {
             mark,
             points: vec![point(0.0, 0.25), point(10.0, 0.5), point(20.0, 3.0)],
         }],
-        legend: Corner::UpperLeft,
     }
 }
 

@@ -100,7 +100,7 @@ fn badge(claim: &Claim) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plot::{Axis, Corner, LineChart};
+    use crate::plot::{Axis, LineChart};
 
     fn chart() -> LineChart {
         let axis = || Axis {
@@ -113,7 +113,6 @@ mod tests {
             x_axis: axis(),
             y_axis: axis(),
             series: Vec::new(),
-            legend: Corner::LowerRight,
         }
     }
 
