@@ -13,7 +13,7 @@ const ROW: f64 = 21.0;
 /// Between a mark and its meaning.
 const BESIDE: f64 = 7.0;
 /// Between a meaning and the next mark.
-const BETWEEN: f64 = 20.0;
+const BETWEEN: f64 = 24.0;
 
 /// A mark with what it means.
 pub(super) struct Entry {

@@ -12,7 +12,7 @@ use super::{Opened, caption::caption};
 use crate::plot::{BattlePicture, Figure, Lens, Link, Side};
 
 /// Agents outside the group whose fields of view are drawn too; more would hide the battle.
-const OTHERS_SHOWN: usize = 3;
+const OTHERS_SHOWN: usize = 1;
 
 /// The decision at `step`, as `mackrl explain` tells it: where all are when it is made, the pairs that are formed, what everybody
 /// then does, and what `group` knows, if it has members. After the last step nothing is decided.
@@ -60,7 +60,7 @@ pub(crate) fn picture(opened: &Opened, step: usize, group: &[AgentId]) -> Battle
             .map(|missile| [missile.x, missile.y].map(f64::from))
             .collect(),
         sight: f64::from(playback.skirmish.settings().sight_range),
-        links: links(opened, step),
+        links: links(opened, step, group),
         lens: (!group.is_empty()).then(|| lens(&moment.visible_n, group, &knowledge)),
     }
 }
@@ -76,6 +76,7 @@ fn figure(opened: &Opened, state: &BattleState, after: &BattleState, index: usiz
             Team::Enemy => Side::Enemy,
         },
         kind: opened.names.kind(EntityId::new(index)).to_owned(),
+        letters: opened.names.letters(EntityId::new(index)).to_owned(),
         name: opened.names.entity(EntityId::new(index)),
         at: place(state),
         to: place(after),
@@ -86,15 +87,17 @@ fn figure(opened: &Opened, state: &BattleState, after: &BattleState, index: usiz
     }
 }
 
-/// The pairs of living agents that the partition chosen at this step contains.
-fn links(opened: &Opened, step: usize) -> Vec<Link> {
+/// The pairs of living agents that the partition chosen at this step contains; those inside `group`, if it has members.
+fn links(opened: &Opened, step: usize, group: &[AgentId]) -> Vec<Link> {
     let visible_n = &opened.playback.moments[step].visible_n;
     let step = opened.replay.steps.get(step);
     let thought = step.and_then(|step| step.thought.as_ref());
     let pairs = thought.into_iter().flat_map(|thought| &thought.pairs);
-    let is_alive = |agent: &AgentId| !visible_n[agent.index()].is_empty();
+    let is_shown = |agent: &AgentId| {
+        !visible_n[agent.index()].is_empty() && (group.is_empty() || group.contains(agent))
+    };
     pairs
-        .filter(|pair| pair.members.iter().all(is_alive))
+        .filter(|pair| pair.members.iter().all(is_shown))
         .filter_map(|pair| {
             Some(Link {
                 members: pair.members.map(AgentId::index),

@@ -8,7 +8,7 @@ use crate::plot::{
 
 const EMPTY_BAR: Colour = Colour(0xD8, 0xD8, 0xD8);
 
-/// A disc or a diamond with the letter of its type.
+/// A disc or a diamond with the letters of its type.
 pub(super) fn body(at: [f64; 2], figure: &Figure, radius: f64, opacity: f64) -> Vec<Shape> {
     let outline = |radius: f64| match figure.side {
         Side::Ally => circle(at, radius, 40),
@@ -20,13 +20,17 @@ pub(super) fn body(at: [f64; 2], figure: &Figure, radius: f64, opacity: f64) -> 
         filled(&outline(radius), figure.side.colour(), opacity),
     ];
     let size = (1.05 * radius).clamp(6.0, 22.0);
-    let letters = figure.kind.chars().take(1);
-    let letter: String = letters.flat_map(char::to_uppercase).collect();
+    // Two letters have to find room too.
+    let size = if figure.letters.chars().count() > 1 {
+        0.8 * size
+    } else {
+        size
+    };
     // In the upper part, because bars stand in the lower.
     let at = [at[0], at[1] + 0.36 * size - 0.28 * radius];
     shapes.push(Shape::Words(Words {
         anchor: Anchor::Middle,
-        ..label(&letter, at, size, Weight::Medium, PAPER)
+        ..label(&figure.letters, at, size, Weight::Medium, PAPER)
     }));
     shapes
 }

@@ -2,7 +2,7 @@
 //!
 //! A picture shows one decision: where the units stand when it is made, the pairs that are formed, and what follows from it, so
 //! that moves, shots and bands belong together. Sides differ in colour and in shape (allies are discs, enemies diamonds), so that
-//! the picture can be read in grey. Bodies have their true size; a letter names the type, and the legend explains it. A [`Lens`]
+//! the picture can be read in grey. Bodies have their true size; letters name the type, and the legend explains it. A [`Lens`]
 //! looks at one group: the fields of view of some agents, and rings about what the group knows.
 //!
 //! Pictures of one film share their ground, their scale and their legend, so that nothing jumps.
@@ -92,6 +92,8 @@ pub(crate) struct Figure {
     pub(crate) side: Side,
     /// Name of its type.
     pub(crate) kind: String,
+    /// What stands for its type.
+    pub(crate) letters: String,
     /// What it is called: A, B, … or e0, e1, …
     pub(crate) name: String,
     /// Where it is, or fell.

@@ -47,7 +47,7 @@ const verb = (agents, one, many) => (agents.length === 1 ? one : many);
 
 /** One sentence: whether the group has common knowledge, and why. */
 function verdictOf(group, known) {
-  if (group.length === 0) return "Nobody is chosen.";
+  if (group.length === 0) return "No agent is chosen.";
   if (group.some((agent) => !isAlive(current.step, agent))) return "The dead know nothing, and nothing is common with them.";
   if (group.length === 1) return `${nameOf(group[0])} alone: all that it sees.`;
   if (known.unseen.length === 0) return group.length === 2
