@@ -238,7 +238,7 @@ fn the_pictures_of_a_film_have_one_size_one_ground_and_one_legend() {
     }
     // Everything below the arena, that is the legend, is the same.
     let width = images[0].width() as usize;
-    let from = (stage.area.bottom + 2.0).round() as usize * width;
+    let from = usize::from(crate::plot::scene::pixels(stage.area.bottom + 2.0)) * width;
     assert!(
         images[0].pixels()[from..] == images[1].pixels()[from..],
         "legends differ"

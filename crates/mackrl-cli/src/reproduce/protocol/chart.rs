@@ -115,6 +115,6 @@ fn series(moment: &Moment) -> Vec<Series> {
     ];
     let ours = ours.map(|(name, colour, rates)| of(Some(name), colour, points(rates)));
     (runs.chain(ours))
-        .chain(published_rates(&moment.published))
+        .chain(published_rates(moment.published))
         .collect()
 }
