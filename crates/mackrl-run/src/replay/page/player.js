@@ -135,7 +135,8 @@ function start() {
     else { current.entity = entity; showKnowledge(); draw(current.time); }
   });
   document.addEventListener("keydown", onKey);
-  new ResizeObserver(() => { resize(); draw(current.time); }).observe(canvas.parentElement);
+  // In the next frame: a canvas that changes its height while sizes are reported would be reported again.
+  new ResizeObserver(() => requestAnimationFrame(() => { resize(); draw(current.time); })).observe(canvas.parentElement);
   buildAgents(); addPlots(); resize();
   current.step = current.time = Math.min(data.start, last);
   current.known = knowledgeOf(current.step, []);
