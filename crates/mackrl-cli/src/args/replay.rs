@@ -6,7 +6,7 @@ use clap::Args;
 
 use crate::args::{MOST, size};
 
-/// Look into a replay: a page for the browser, a picture of a step
+/// Look into a replay: a page for the browser, a picture of a step, a film
 ///
 /// Plays the episode again and compares every state with the recording; what is shown is what happened. Without an output it
 /// says how the episode went. `mackrl play --save-replay` and `mackrl evaluate --save-replays` write replays.
@@ -15,7 +15,8 @@ use crate::args::{MOST, size};
 /// jointly or delegated and with what probability, and for every group that is clicked what is common knowledge, what is not, and
 /// why.
 ///
-/// Examples: mackrl replay battle.replay.gz --html battle.html; mackrl replay battle.replay.gz --svg battle.svg --step 12 --group A,B
+/// Examples: mackrl replay battle.replay.gz --html battle.html; mackrl replay battle.replay.gz --svg battle.svg --step 12 --group A,B; mackrl
+/// replay battle.replay.gz --gif battle.gif --group A,B
 #[derive(Debug, Args)]
 pub(crate) struct ReplayArgs {
     /// Replay to look into
@@ -30,7 +31,11 @@ pub(crate) struct ReplayArgs {
     #[arg(long, value_name = "OUT")]
     pub(crate) svg: Option<PathBuf>,
 
-    /// Steps that have passed in what is drawn or shown first: 0 is the start [default: half of the episode; 0 in pages]
+    /// Draw the whole battle as an animated GIF of eight seconds; long battles take longer
+    #[arg(long, value_name = "OUT")]
+    pub(crate) gif: Option<PathBuf>,
+
+    /// Decision that is drawn or shown first: 0 is the first, as in `explain` [default: half of the episode; 0 in pages]
     #[arg(long, value_name = "T", value_parser = size(0, MOST))]
     pub(crate) step: Option<usize>,
 

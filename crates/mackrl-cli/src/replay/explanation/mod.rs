@@ -5,7 +5,7 @@ mod text;
 
 use mackrl::policy::{GroupChoice, PairThought, Thought};
 use mackrl_env::{Action, AgentId, EntityId, EntitySet};
-use mackrl_run::replay::{GroupKnowledge, Summary};
+use mackrl_run::replay::{GroupKnowledge, Summary, living_groups};
 use serde::Serialize;
 
 use super::Opened;
@@ -241,7 +241,7 @@ impl Writer<'_> {
         Controllers {
             partitions: partitions
                 .map(|(index, partition)| Partition {
-                    groups: self.groups(&partition.groups),
+                    groups: self.groups(&living_groups(thought, partition)),
                     probability: partition.probability,
                     posterior: partition.posterior,
                     is_chosen: thought.chosen == Some(index),
@@ -304,7 +304,7 @@ impl Writer<'_> {
         let chosen = thought.chosen.map(|index| &thought.partitions[index]);
         path.extend(chosen.map(|partition| Chosen {
             controller: PARTITION.to_owned(),
-            choice: self.groups(&partition.groups),
+            choice: self.groups(&living_groups(thought, partition)),
             probability: partition.probability,
         }));
         let mut together = EntitySet::EMPTY;

@@ -108,7 +108,7 @@ fn badge(claim: &Claim) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plot::{Axis, Corner, LineChart};
+    use crate::plot::{Axis, LineChart};
 
     fn chart() -> LineChart {
         let axis = || Axis {
@@ -121,7 +121,6 @@ mod tests {
             x_axis: axis(),
             y_axis: axis(),
             series: Vec::new(),
-            legend: Corner::LowerRight,
         }
     }
 
