@@ -68,8 +68,8 @@ fn a_zoo_is_trained_once_told_and_published() {
         "--json",
     ];
     words.extend(SMALL.iter().flat_map(|setting| ["--set", setting]));
-    let paths: [(&str, &Path); 3] = [("--out", &out), ("--page", &page), ("--publish", &zoo)];
-    let first = json(&mackrl(&words, &paths));
+    let own: [(&str, &Path); 3] = [("--out", &out), ("--page", &page), ("--publish", &zoo)];
+    let first = json(&mackrl(&words, &own));
     let team = &first["teams"][0];
     assert_eq!(
         (&team["map"], &team["steps_env"]),
@@ -85,7 +85,19 @@ fn a_zoo_is_trained_once_told_and_published() {
 
     plays_as_recorded(&zoo.join("3m"));
     let replay = zoo.join("3m/replays/best-seed1-episode0.replay.gz");
-    assert!(mackrl(&["replay"], &[("--", &replay)]).status.success());
+    let battle = folder.path().join("battle.html");
+    let paths: [(&str, &Path); 2] = [("--html", &battle), ("--", &replay)];
+    assert!(mackrl(&["replay"], &paths).status.success());
+    let published = fs::read(zoo.join("3m/battle.html")).expect("a page");
+    assert_eq!(published, fs::read(&battle).expect("a page"));
+    let card = fs::read_to_string(zoo.join("3m/README.md")).expect("a card");
+    for told in [
+        "`mackrl-ppo` for 900 environment steps with seed 1",
+        "over 40 battles",
+        "best-seed1-episode0",
+    ] {
+        assert!(card.contains(told), "{told} in {card}");
+    }
     let told = mackrl(
         &["evaluate", "--episodes", "40", "--checkpoint", "best"],
         &[("--", &zoo.join("3m"))],
@@ -118,7 +130,7 @@ fn a_zoo_is_trained_once_told_and_published() {
     }
 
     let record = fs::read(out.join("3m/run.json")).expect("a record");
-    assert_eq!(json(&mackrl(&words, &paths)), first);
+    assert_eq!(json(&mackrl(&words, &own)), first);
     assert_eq!(fs::read(out.join("3m/run.json")).expect("a record"), record);
 }
 
@@ -206,6 +218,13 @@ fn committed_teams_win_what_they_won_to_the_last_battle() {
             .map(|entry| entry.expect("a replay").path())
             .collect();
         assert!(!replays.is_empty(), "{}", folder.display());
+        for shown in ["battle.html", "README.md"] {
+            assert!(
+                folder.join(shown).is_file(),
+                "{} has no {shown}",
+                folder.display()
+            );
+        }
         for replay in replays {
             let output = mackrl(&["replay"], &[("--", &replay)]);
             let error = String::from_utf8_lossy(&output.stderr);
