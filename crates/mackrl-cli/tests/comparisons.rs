@@ -197,6 +197,53 @@ fn a_comparison_is_made_from_a_plan_and_drawn_again_from_what_is_kept() {
     );
 }
 
+#[test]
+fn published_points_stand_beside_ours_and_claims_wait_for_runs_enough() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [plan, out, runs] = ["plan.toml", "out", "runs"].map(|name| folder.path().join(name));
+    let text = "preset = \"paper-figures\"\nmaps = [\"3m\"]\nseeds = 1\n\
+                [settings]\nrun.steps_env = 600\ntest.interval_steps_env = 300\ntest.episodes = 4\n\
+                [variants.mackrl]\nalgorithm.name = \"mackrl\"\n\
+                [variants.coma]\nalgorithm.name = \"coma\"\n";
+    fs::write(&plan, text).expect("a plan");
+    fs::create_dir(&out).expect("a folder");
+    let readme = out.join("README.md");
+    let marks = ["figure4-neurips", "calibration"]
+        .map(|name| format!("<!-- {name}: begin -->\n<!-- {name}: end -->\n"));
+    fs::write(&readme, marks.concat()).expect("a page");
+    let paths: [(&str, &Path); 3] = [("--plan", &plan), ("--out", &out), ("--runs", &runs)];
+    let found = json(&mackrl(&["reproduce", "figure4-neurips", "--json"], &paths));
+    let rows = found["rows"].as_array().expect("rows").iter();
+    let rows: Vec<(&Value, &Value)> = rows.map(|row| (&row["learner"], &row["runs"])).collect();
+    // As a plan orders its variants.
+    assert_eq!(
+        rows,
+        [(&"coma".into(), &1.into()), (&"mackrl".into(), &1.into())]
+    );
+    let beside = found["beside"].as_array().expect("points");
+    assert_eq!(beside.len(), 8, "0.5, 1, 1.5 and 2 million steps of both");
+    assert_eq!(
+        (&beside[4]["recorded"], &beside[4]["ours"]),
+        (&0.91.into(), &Value::Null)
+    );
+    assert_eq!(found["claims"], serde_json::json!([]));
+    let table = fs::read_to_string(&readme).expect("the page");
+    assert!(
+        table.contains("| 3m | mackrl | 500 k | – | 0 | 0.910 |"),
+        "{table}"
+    );
+    assert!(
+        table.contains("needs 5 runs of 2000000 steps of each of mackrl and"),
+        "{table}"
+    );
+    // The other command draws the same plan beside its own points: the real game's, of other learners.
+    let other = mackrl(
+        &["reproduce", "calibration", "--as-it-stands", "--json"],
+        &paths,
+    );
+    assert_eq!(json(&other).get("beside"), None);
+}
+
 /// The folders of the committed teams.
 fn committed() -> Vec<PathBuf> {
     let zoo = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../zoo");

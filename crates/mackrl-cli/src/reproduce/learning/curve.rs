@@ -73,6 +73,12 @@ impl Difference {
     pub(crate) fn is_ahead(self) -> bool {
         self.mean > 2.0 * self.error
     }
+
+    /// Whether the first mean is less by more than two standard errors.
+    #[must_use]
+    pub(crate) fn is_behind(self) -> bool {
+        -self.mean > 2.0 * self.error
+    }
 }
 
 impl std::fmt::Display for Difference {
