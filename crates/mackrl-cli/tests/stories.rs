@@ -72,6 +72,8 @@ fn help_teaches_every_command() {
         "reproduce ablations",
         "reproduce all",
         "reproduce ppo",
+        "reproduce figure4-neurips",
+        "reproduce calibration",
         "reproduce zoo",
         "play",
         "fidelity",

@@ -28,7 +28,8 @@ use mackrl::nn::InstructionSet;
 use mackrl_run::provenance::CODE;
 
 use crate::reproduce::{
-    ablations::AblationOptions, all::AllOptions, figure5::Figure5Options, figure6::Figure6Options,
+    ablations::AblationOptions, all::AllOptions, calibration::CalibrationOptions,
+    figure4_neurips::Figure4Options, figure5::Figure5Options, figure6::Figure6Options,
     figure7::Figure7Options, ppo::PpoOptions, protocol::ProtocolOptions, zoo::ZooOptions,
 };
 pub(crate) use analysis::{CurveAxis, CurveStatistic, PlotArgs, ReportArgs};
@@ -179,6 +180,8 @@ pub(crate) enum Figure {
     Protocol(ProtocolOptions),
     All(AllOptions),
     Ppo(PpoOptions),
+    Figure4Neurips(Figure4Options),
+    Calibration(CalibrationOptions),
     Zoo(ZooOptions),
 }
 

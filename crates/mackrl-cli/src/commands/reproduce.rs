@@ -8,7 +8,11 @@ use crate::{
     args::{Figure, ReproduceArgs},
     output,
     progress::Meter,
-    reproduce::{ablations, all, figure5, figure6, figure7, ppo, protocol, zoo},
+    reproduce::{
+        ablations, all, calibration,
+        comparison::{Comparison, ComparisonOptions},
+        figure4_neurips, figure5, figure6, figure7, ppo, protocol, zoo,
+    },
     signals,
 };
 
@@ -18,12 +22,22 @@ pub(crate) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
         Figure::Figure6(options) => (&figure6::FIGURE, &options.learning, None),
         Figure::Figure7(options) => (&figure7::FIGURE, &options.learning, None),
         Figure::Ablations(options) => (&ablations::FIGURE, &options.learning, Some(&*options.map)),
-        Figure::Ppo(options) => return print(&ppo::run(options)?, options.json),
+        Figure::Ppo(options) => return compare(&ppo::COMPARISON, &options.comparison),
+        Figure::Figure4Neurips(options) => {
+            return compare(&figure4_neurips::COMPARISON, &options.comparison);
+        }
+        Figure::Calibration(options) => {
+            return compare(&calibration::COMPARISON, &options.comparison);
+        }
         Figure::Zoo(options) => return print(&zoo::run(options)?, options.json),
         Figure::Protocol(options) => return print(&protocol::run(options)?, options.json),
         Figure::All(options) => return print(&all::run(options)?, options.learning.json),
     };
     print(&figure.run(options, map)?, options.json)
+}
+
+fn compare(comparison: &Comparison, options: &ComparisonOptions) -> anyhow::Result<()> {
+    print(&comparison.run(options)?, options.json)
 }
 
 fn figure5(options: &figure5::Figure5Options) -> anyhow::Result<()> {

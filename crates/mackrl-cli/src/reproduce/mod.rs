@@ -4,7 +4,10 @@
 
 pub(crate) mod ablations;
 pub(crate) mod all;
+pub(crate) mod calibration;
 mod claim;
+pub(crate) mod comparison;
+pub(crate) mod figure4_neurips;
 pub(crate) mod figure5;
 pub(crate) mod figure6;
 pub(crate) mod figure7;

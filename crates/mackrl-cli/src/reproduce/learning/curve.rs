@@ -90,6 +90,12 @@ impl Difference {
     pub(crate) fn is_ahead(self) -> bool {
         self.interval()[0] > 0.0
     }
+
+    /// Whether the first mean is less: whether the interval lies below 0.
+    #[must_use]
+    pub(crate) fn is_behind(self) -> bool {
+        self.interval()[1] < 0.0
+    }
 }
 
 impl std::fmt::Display for Difference {

@@ -4,7 +4,7 @@ use std::fmt::{Display, Formatter};
 
 use mackrl::statistics::Crossings;
 
-use super::report::{Report, Row};
+use super::report::{Beside, Report, Row};
 use crate::{
     output,
     reproduce::{entry, interval, page, write_verdicts},
@@ -22,12 +22,19 @@ const HEADING: [&str; 9] = [
     "minutes",
 ];
 
+/// Of the table of what others recorded.
+const BESIDE: [&str; 6] = ["map", "learner", "after steps", "ours", "runs", "recorded"];
+
 impl Report {
     fn cells(&self) -> Vec<Vec<String>> {
         self.rows.iter().map(cells).collect()
     }
 
-    /// The table, the verdicts and what made the runs, in Markdown.
+    fn beside(&self) -> Vec<Vec<String>> {
+        self.beside.iter().map(beside).collect()
+    }
+
+    /// The tables, the verdicts and what made the runs, in Markdown.
     pub(super) fn markdown(&self) -> String {
         let claims = self.claims.iter().map(|claim| {
             format!(
@@ -37,9 +44,14 @@ impl Report {
                 claim.evidence
             )
         });
-        let versions = self.provenance.first().map(|one| one.versions.to_string());
+        let versions = self.provenance.first();
+        let versions = versions.map(|one| format!(", made by {}", one.versions));
+        let beside = match &self.beside()[..] {
+            [] => String::new(),
+            rows => page::table(&BESIDE, rows) + "\n",
+        };
         format!(
-            "{}\n{} of {} runs, made by {}.\n\n{}",
+            "{}\n{beside}{} of {} runs{}.\n\n{}",
             page::table(&HEADING, &self.cells()),
             self.finished,
             self.planned,
@@ -54,6 +66,11 @@ impl Display for Report {
         let heading = HEADING.map(str::to_owned).to_vec();
         let rows = [vec![heading], self.cells()].concat();
         writeln!(formatter, "{}", output::table(&rows))?;
+        if !self.beside.is_empty() {
+            let heading = BESIDE.map(str::to_owned).to_vec();
+            let rows = [vec![heading], self.beside()].concat();
+            writeln!(formatter, "{}", output::table(&rows))?;
+        }
         writeln!(formatter, "{} of {} runs\n", self.finished, self.planned)?;
         write_verdicts(formatter, &self.claims)
     }
@@ -89,6 +106,21 @@ fn cells(row: &Row) -> Vec<String> {
     );
     cells.push(format!("{:.1}", found.minutes));
     cells
+}
+
+fn beside(beside: &Beside) -> Vec<String> {
+    vec![
+        beside.map.clone(),
+        beside.learner.clone(),
+        format!("{} k", beside.steps_env / 1000),
+        match (beside.ours, beside.runs) {
+            (None, _) => "–".to_owned(),
+            (Some((won, _)), 1) => format!("{won:.3}"),
+            (Some((won, error)), _) => entry(won, error),
+        },
+        beside.runs.to_string(),
+        format!("{:.3}", beside.recorded),
+    ]
 }
 
 /// "45 k (5/5)": the median over runs, and how many of them get there.

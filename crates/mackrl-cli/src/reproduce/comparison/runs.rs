@@ -1,4 +1,4 @@
-//! The runs of a plan, by map and learner, and what is kept of those that are finished.
+//! The runs of plans, by map and learner, and what is kept of those that are finished.
 
 use std::{fs, path::Path};
 
@@ -104,7 +104,7 @@ fn file_name(entry: &Entry) -> String {
     format!("{}.json", entry.name)
 }
 
-/// All cells of a plan, in the order in which it first speaks of them, with the runs that are kept.
+/// All cells of some plans, in the order in which they first speak of them, with the runs that are kept.
 pub(super) fn cells(entries: &[Entry], out: &Path) -> Vec<Cell> {
     let mut cells: Vec<Cell> = Vec::new();
     for entry in entries {
@@ -127,10 +127,47 @@ pub(super) fn cells(entries: &[Entry], out: &Path) -> Vec<Cell> {
     cells
 }
 
-/// The name of a run without map and seed.
+/// The name of a run without map and seed; a variant that is called as what learns in it is that learner.
 fn learner(entry: &Entry) -> String {
     let seed = format!("-seed{}", entry.config.run.seed);
     let name = entry.name.strip_suffix(&seed).unwrap_or(&entry.name);
-    let start = name.find(entry.config.algorithm.name()).unwrap_or(0);
-    name[start..].to_owned()
+    let algorithm = entry.config.algorithm.name();
+    let start = name.find(algorithm).unwrap_or(0);
+    match name[start..].strip_prefix(algorithm) {
+        Some(variant) if variant.strip_prefix('-') == Some(algorithm) => algorithm.to_owned(),
+        _ => name[start..].to_owned(),
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use mackrl_run::config::Config;
+
+    use super::*;
+
+    /// A learner on a map, with a run for each list of shares of battles won in tests after every 100 steps.
+    pub(in super::super) fn cell_of(map: &str, learner: &str, won: Vec<Vec<f64>>) -> Cell {
+        let tests = won.iter().map(Vec::len).max().unwrap_or(0) as u64;
+        let kept = |won| Kept {
+            run: TrainingRun::new(&Config::default(), won, Vec::new()),
+            beside: Beside {
+                wall_s: 90.0,
+                teams: None,
+            },
+        };
+        Cell {
+            map: map.to_owned(),
+            learner: learner.to_owned(),
+            planned: 5,
+            steps_env: 100 * tests.saturating_sub(1),
+            interval: 100,
+            runs: won.into_iter().map(kept).collect(),
+        }
+    }
+
+    /// The same, with three tests of which the last has these shares.
+    pub(in super::super) fn cell(map: &str, learner: &str, ends: &[f64]) -> Cell {
+        let won = ends.iter().map(|&end| vec![0.0, end / 2.0, end]);
+        cell_of(map, learner, won.collect())
+    }
 }

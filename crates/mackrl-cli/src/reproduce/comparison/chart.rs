@@ -1,6 +1,9 @@
 //! The curves: a panel for each map.
 
-use super::report::{Report, Row};
+use super::{
+    Comparison, Recorded,
+    report::{Report, Row},
+};
 use crate::{
     plot::{Axis, Colour, Mark, Multiple, Point, Series, SmallMultiples},
     reproduce::Chart,
@@ -19,7 +22,7 @@ const COLUMNS: usize = 4;
 
 impl Report {
     /// Curves as small multiples.
-    pub(super) fn chart(&self) -> Chart {
+    pub(super) fn chart(&self, comparison: &Comparison) -> Chart {
         let mut learners: Vec<&str> = Vec::new();
         let mut maps: Vec<&str> = Vec::new();
         for row in &self.rows {
@@ -35,16 +38,24 @@ impl Report {
                 rows.find(|row| row.map == **map && row.learner == **learner)
             };
             let numbered = learners.iter().zip(COLOURS.iter().cycle());
-            let series = numbered.map(|(learner, &colour)| Series {
+            let ours = numbered.clone().map(|(learner, &colour)| Series {
                 name: Some((*learner).to_owned()),
                 colour,
                 mark: Mark::Line,
                 points: own(learner).map(points).unwrap_or_default(),
             });
+            let recorded = numbered.filter_map(|(learner, &colour)| {
+                Some(Series {
+                    name: None,
+                    colour,
+                    mark: Mark::Rings,
+                    points: rings(comparison.recorded_of(map, learner)?),
+                })
+            });
             Multiple {
                 title: (*map).to_owned(),
                 note: note(self.rows.iter().filter(|row| row.map == **map)),
-                series: series.collect(),
+                series: ours.chain(recorded).collect(),
             }
         };
         let axis = |label: &str, range| Axis {
@@ -52,9 +63,8 @@ impl Report {
             range,
         };
         Chart::Multiples(SmallMultiples {
-            title: "MACKRL-PPO beside MAPPO and IPPO".to_owned(),
-            subtitle: "Greedy tests during training; mean over runs, band ± one standard error"
-                .to_owned(),
+            title: comparison.title.to_owned(),
+            subtitle: comparison.subtitle.to_owned(),
             x_axis: axis("Environment steps", None),
             y_axis: axis("Share of battles won", Some([-0.02, 1.02])),
             columns: COLUMNS.min(maps.len()),
@@ -70,6 +80,14 @@ fn points(row: &Row) -> Vec<Point> {
     let curve = found.steps.iter().zip(&found.curve);
     curve
         .map(|(&step, &(mean, error))| Point::with_error(step as f64, mean, error))
+        .collect()
+}
+
+/// What others recorded.
+fn rings(recorded: &Recorded) -> Vec<Point> {
+    let points = recorded.points();
+    points
+        .map(|(step, won)| Point::exact(step as f64, won))
         .collect()
 }
 
