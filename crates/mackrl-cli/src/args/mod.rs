@@ -180,7 +180,8 @@ pub(crate) enum Figure {
     Protocol(ProtocolOptions),
     All(AllOptions),
     Ppo(PpoOptions),
-    Figure4Neurips(Figure4Options),
+    #[command(name = "figure4-neurips")]
+    Neurips(Figure4Options),
     Calibration(CalibrationOptions),
     Zoo(ZooOptions),
 }

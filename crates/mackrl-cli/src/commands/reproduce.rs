@@ -23,7 +23,7 @@ pub(crate) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
         Figure::Figure7(options) => (&figure7::FIGURE, &options.learning, None),
         Figure::Ablations(options) => (&ablations::FIGURE, &options.learning, Some(&*options.map)),
         Figure::Ppo(options) => return compare(&ppo::COMPARISON, &options.comparison),
-        Figure::Figure4Neurips(options) => {
+        Figure::Neurips(options) => {
             return compare(&figure4_neurips::COMPARISON, &options.comparison);
         }
         Figure::Calibration(options) => {

@@ -15,7 +15,7 @@ use super::{
 ///
 /// Writes calibration.json, .svg and .png, and fills its tables into README.md between `<!-- calibration: begin -->` and
 /// `<!-- calibration: end -->`, if it is there. Recorded points are rings, and stand in a table beside ours. They are one run
-/// each, except QMIX on 8m (two runs) and on 5m_vs_6m (three). Nothing of the game is tuned to them.
+/// each, except QMIX on `8m` (two runs) and on `5m_vs_6m` (three). Nothing of the game is tuned to them.
 ///
 /// Examples: mackrl reproduce calibration --jobs 2; mackrl reproduce calibration --as-it-stands
 #[derive(Debug, Clone, Args)]
