@@ -30,6 +30,12 @@ pub(crate) enum Failure {
     /// Runs of a sweep that were stopped from outside.
     #[error("{message}")]
     RunsStopped { message: String },
+    /// Work that was stopped from outside, of which nothing is kept.
+    #[error("{what} was stopped, and nothing of it is kept")]
+    Stopped {
+        /// What was done.
+        what: String,
+    },
     /// A run that another process is making at the moment.
     #[error("{message}")]
     MadeElsewhere { message: String },
@@ -123,7 +129,8 @@ pub(crate) fn report(outcome: anyhow::Result<()>) -> ExitCode {
 
 /// The chain of causes on one line, and the remedy on another if one is known.
 fn explain(error: &anyhow::Error) -> String {
-    let mut text = format!("error: {}\n", printable(&format!("{error:#}")));
+    let kind = if is_stop(error) { "note" } else { "error" };
+    let mut text = format!("{kind}: {}\n", printable(&format!("{error:#}")));
     let is_of_stdout =
         |cause: &(dyn StdError + 'static)| matches!(cause.downcast_ref(), Some(Failure::Stdout(_)));
     let mut causes = error.chain().take_while(|cause| !is_of_stdout(*cause));
@@ -131,6 +138,34 @@ fn explain(error: &anyhow::Error) -> String {
         text.push_str(&format!("hint: {}\n", printable(&hint)));
     }
     text
+}
+
+/// Whether somebody asked the program to stop, which is no error.
+fn is_stop(error: &anyhow::Error) -> bool {
+    error.chain().any(|cause| {
+        let run = cause.downcast_ref().map(RunError::root);
+        let is_of_run = matches!(
+            run,
+            Some(RunError::Interrupted { .. } | RunError::SweepInterrupted { .. })
+        );
+        is_of_run
+            || matches!(
+                cause.downcast_ref(),
+                Some(Failure::RunsStopped { .. } | Failure::Stopped { .. })
+            )
+    })
+}
+
+/// Tells that the program was asked to stop, and ends it.
+pub(crate) fn end_stopped(what: &str) -> ! {
+    let error = anyhow::Error::from(Failure::Stopped {
+        what: what.to_owned(),
+    });
+    // Several threads may notice; the first keeps the others waiting until the program has ended.
+    let mut stderr = io::stderr().lock();
+    // Nothing is left to do if stderr cannot be written either.
+    let _ = stderr.write_all(explain(&error).as_bytes());
+    std::process::exit(exit(&error) as i32)
 }
 
 fn exit(error: &anyhow::Error) -> Exit {
@@ -181,9 +216,9 @@ fn of_failure(failure: &Failure) -> Verdict {
         Failure::Stdout(_) => (Exit::InputOutput, None),
         Failure::RunsWithoutSystem { .. } => (
             Exit::InputOutput,
-            Some("go on with the same command when that is mended".to_owned()),
+            Some("go on with the same command when that is repaired".to_owned()),
         ),
-        Failure::RunsStopped { .. } => (
+        Failure::RunsStopped { .. } | Failure::Stopped { .. } => (
             Exit::Interrupted,
             Some("go on with the same command".to_owned()),
         ),
@@ -194,12 +229,18 @@ fn of_failure(failure: &Failure) -> Verdict {
         | Failure::Unfaithful { .. } => (Exit::Differs, None),
         Failure::OtherVersions { .. } => (
             Exit::Usage,
-            Some("take them together as they are with --any-code, or choose another folder with --out".to_owned()),
+            Some(
+                "take them together as they are with --mix, or choose another folder with --out"
+                    .to_owned(),
+            ),
         ),
         Failure::NotReady { .. } => (Exit::InputOutput, None),
         Failure::ReplayDiffers { .. } => (
             Exit::Data,
-            Some("the file was changed, or its program simulated otherwise: record it again".to_owned()),
+            Some(
+                "the file was changed, or its program simulated otherwise: record it again"
+                    .to_owned(),
+            ),
         ),
         Failure::OtherSimulator { program, .. } => (
             Exit::Data,
@@ -242,6 +283,14 @@ fn of_run(error: &RunError) -> Verdict {
                 "run.weights_interval_steps_env=N keeps weights every N steps; a run's first test chooses its best"
                     .to_owned(),
             ),
+        ),
+        RunError::NotFurther { .. } => (Exit::Usage, None),
+        RunError::NoWayFurther { folder } => (
+            Exit::Usage,
+            Some(format!(
+                "`mackrl train --from {} --steps N --out DIR` begins another run with its weights",
+                folder.display()
+            )),
         ),
         RunError::OtherConfiguration { .. } => (
             Exit::Usage,

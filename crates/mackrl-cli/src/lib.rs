@@ -77,6 +77,8 @@ pub fn run(registry: Registry) -> ExitCode {
         Command::Config(args) => commands::config::run(&args),
         Command::Bench(args) => commands::bench::run(&args),
         Command::Sc2(args) => commands::sc2::run(&args),
+        Command::Completions(args) => commands::shell::completions(&args),
+        Command::Man(args) => commands::shell::man(&args),
     };
     failure::report(outcome)
 }

@@ -9,6 +9,8 @@ use signal_hook::{
     flag,
 };
 
+use crate::failure;
+
 /// Exit code of a program that a second SIGINT stopped at once: 128 + SIGINT, as shells have it.
 const STOPPED_AT_ONCE: i32 = 130;
 
@@ -32,6 +34,13 @@ fn register(request: &StopRequest) -> io::Result<()> {
     #[cfg(unix)]
     flag::register(signal_hook::consts::SIGUSR1, flag())?;
     Ok(())
+}
+
+/// Ends the program if it was asked to stop, in work of which nothing is kept.
+pub(crate) fn end_if_asked(request: &StopRequest, what: &str) {
+    if request.is_made() {
+        failure::end_stopped(what);
+    }
 }
 
 /// Asks to stop, as a signal would, when the other end of stdin is closed.

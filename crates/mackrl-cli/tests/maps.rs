@@ -133,5 +133,72 @@ fn a_terrain_that_is_shown_can_be_put_into_a_scenario() {
     std::fs::write(&file, text).expect("the folder can be written");
     let mut copy = mackrl(&["maps", file.to_str().expect("a UTF-8 path"), "--json"]);
     copy["name"] = map["name"].clone();
+    assert!(copy["known"].is_null(), "a scenario is not SMAC's map");
+    copy["known"] = map["known"].clone();
     assert_eq!(copy, map);
+}
+
+/// A file of the repository.
+fn committed(name: &str) -> Option<Value> {
+    let text = std::fs::read_to_string(format!("{}/../../{name}", env!("CARGO_MANIFEST_DIR")));
+    text.ok()
+        .map(|text| serde_json::from_str(&text).expect("JSON"))
+}
+
+/// The best results on a map that are committed.
+fn best_results(map: &str) -> Value {
+    let scripted = committed("results/scripted/scripted.json").expect("results of scripts");
+    let won = |row: &Value| row["battle_won_mean"].as_f64().expect("a share");
+    let mut script: Option<&Value> = None;
+    for row in scripted["rows"].as_array().expect("rows") {
+        if row["map"] == map && script.is_none_or(|best| won(row) > won(best)) {
+            script = Some(row);
+        }
+    }
+    let script = script.expect("every map was played by scripts");
+    let source = format!("zoo/{map}");
+    let team = committed(&format!("{source}/run.json")).map(|run| run["teams"].clone());
+    let score = |which: &str| team.as_ref().map(|teams| teams[which].clone());
+    let mean = |score: &Value| score["mean"].as_f64();
+    let best = [score("best"), score("last")].into_iter().flatten();
+    let best = best.reduce(|one, other| {
+        if mean(&other) > mean(&one) {
+            other
+        } else {
+            one
+        }
+    });
+    let trained = best
+        .map(|best| json!({ "won": best["mean"], "episodes": best["episodes"], "source": source }));
+    json!({
+        "map": map,
+        "scripted": {
+            "policy": script["policy"],
+            "won": script["battle_won_mean"],
+            "episodes": script["episodes"],
+            "source": "results/scripted",
+        },
+        "trained": trained,
+    })
+}
+
+/// `UPDATE_KNOWN=1` writes the file anew.
+#[test]
+fn known_results_are_those_that_are_committed() {
+    let file = format!(
+        "{}/src/commands/maps/known.json",
+        env!("CARGO_MANIFEST_DIR")
+    );
+    let names = mackrl_skirmish::map_names();
+    let expected = Value::Array(names.iter().map(|map| best_results(map)).collect());
+    if std::env::var_os("UPDATE_KNOWN").is_some() {
+        let text = serde_json::to_string_pretty(&expected).expect("JSON") + "\n";
+        std::fs::write(&file, text).expect("the file can be written");
+    }
+    let known = std::fs::read_to_string(&file).expect("the file is in the repository");
+    let known: Value = serde_json::from_str(&known).expect("JSON");
+    assert_eq!(
+        known, expected,
+        "UPDATE_KNOWN=1 cargo test -p mackrl --test maps"
+    );
 }

@@ -217,3 +217,83 @@ fn a_finished_run_is_left_as_it_is() {
     );
     assert!(files() == before, "a finished run was touched");
 }
+
+/// A run that was planned for `planned` steps and then made longer, once for each length.
+fn extended(run: &Path, planned: u64, lengths: &[&str]) -> String {
+    exits(train(run, &[&format!("run.steps_env={planned}")]), 0);
+    let mut told = String::new();
+    for length in lengths {
+        let mut command = resume(run, 2);
+        command.args(["--steps", length]);
+        told = exits(command, 0);
+    }
+    told
+}
+
+#[test]
+fn a_run_that_is_made_longer_is_the_run_of_that_length() {
+    let expected = uninterrupted().of_any_plan();
+    let parent = tempfile::tempdir().expect("a folder for the run");
+    let run = |name: &str| parent.path().join(name);
+    let told = extended(&run("once"), 700, &["1_500"]);
+    assert!(
+        told.contains(
+            "was planned for 700 environment steps and is now for 1500: it goes on from step "
+        ),
+        "{told}"
+    );
+    assert!(outcome(&run("once")).of_any_plan() == expected);
+    // Twice, and once from where a test is due in any case.
+    extended(&run("twice"), 300, &["1000", "1500"]);
+    assert!(outcome(&run("twice")).of_any_plan() == expected);
+    let record = fs::read_to_string(run("twice").join("run.json")).expect("a record");
+    let record: serde_json::Value = serde_json::from_str(&record).expect("JSON");
+    let former = record["former_plans"].as_array().expect("former plans");
+    let lengths: Vec<_> = former.iter().map(|plan| &plan["steps_env"]).collect();
+    assert_eq!(lengths, [300, 1000]);
+    let config = fs::read_to_string(run("twice").join("config.toml")).expect("a configuration");
+    assert!(config.contains("steps_env = 1500"), "{config}");
+    // As one command more often than needed.
+    let mut again = resume(&run("twice"), 1);
+    again.args(["--steps", "1500"]);
+    assert!(exits(again, 0).contains("is finished: nothing is left to do"));
+    let mut shorter = resume(&run("twice"), 1);
+    shorter.args(["--steps", "1400"]);
+    let stderr = exits(shorter, 2);
+    assert!(
+        stderr.contains("is planned for 1500 environment steps, expected more"),
+        "{stderr}"
+    );
+}
+
+#[test]
+fn a_run_without_a_checkpoint_before_its_end_goes_no_further_unless_it_is_short() {
+    let parent = tempfile::tempdir().expect("a folder for the run");
+    let run = parent.path().join("run");
+    exits(
+        train(&run, &["run.steps_env=400", "run.checkpoints_kept=1"]),
+        0,
+    );
+    let before = fs::read(run.join("run.json")).expect("a record");
+    let mut longer = resume(&run, 1);
+    longer.args(["--steps", "1500"]);
+    let stderr = exits(longer, 2);
+    assert!(
+        stderr.contains("keeps no checkpoint from before its end"),
+        "{stderr}"
+    );
+    assert!(stderr.contains("hint: `mackrl train --from "), "{stderr}");
+    assert!(
+        fs::read(run.join("run.json")).expect("a record") == before,
+        "it was touched"
+    );
+    // A run without any due checkpoint begins again.
+    let rare = "run.checkpoint_interval_steps_env=100000";
+    let [short, whole] = ["short", "whole"].map(|name| parent.path().join(name));
+    exits(train(&short, &["run.steps_env=400", rare]), 0);
+    let mut longer = resume(&short, 1);
+    longer.args(["--steps", "600"]);
+    assert!(exits(longer, 0).contains("it begins again"));
+    exits(train(&whole, &["run.steps_env=600", rare]), 0);
+    assert!(outcome(&short).of_any_plan() == outcome(&whole).of_any_plan());
+}

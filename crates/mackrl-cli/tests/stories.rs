@@ -72,6 +72,8 @@ fn help_teaches_every_command() {
         "reproduce ablations",
         "reproduce all",
         "reproduce ppo",
+        "reproduce figure4-neurips",
+        "reproduce calibration",
         "reproduce zoo",
         "play",
         "fidelity",
@@ -80,6 +82,8 @@ fn help_teaches_every_command() {
         "serve",
         "maps",
         "config",
+        "completions",
+        "man",
         "bench",
         "bench env",
         "bench update",
@@ -344,7 +348,7 @@ fn every_measurement_says_what_it_measured() {
 #[test]
 fn measuring_nothing_is_a_usage_error() {
     insta::assert_snapshot!(type_in("bench update --rows 0").fails(2), @r"
-    error: invalid value '0' for '--rows <B>': expected 1 to 10000
+    error: invalid value '0' for '--rows <B>': expected a whole number from 1 to 10000, such as 20000, 20_000 or 2e4
 
     For more information, try '--help'.
     ");
@@ -363,7 +367,11 @@ fn the_table_of_maps_has_a_line_for_each_and_then_says_what_else_there_is() {
         assert_eq!(line.split(' ').next(), Some(name));
     }
     assert_eq!(lines[json.len() + 1], "");
-    assert!(lines[json.len() + 2].contains("matrix-game"), "{table}");
+    let also = lines[json.len() + 2..].join("\n");
+    assert!(
+        also.contains("difficulty: ") && also.contains("matrix-game"),
+        "{table}"
+    );
 }
 
 #[test]
@@ -467,8 +475,8 @@ fn a_scenario_of_ones_own_is_checked_played_and_trained_on() {
     let folder = folder_with_example();
     let story = |line: &str| type_in_folder(line, folder.path());
     insta::assert_snapshot!(story("maps --check my.toml").succeeds(), @r"
-    name  n_agents  n_enemies  n_actions  obs_size  state_size  episode_limit
-    my           3          8         14        55          78            150
+    name  sides  races  kind  steps  difficulty  scripted  trained
+    my    3 v 8  T v Z          150
     ");
     story("play --map ./my.toml --episodes 3 --policy kite").succeeds();
     story("train --map ./my.toml --steps 100 --set test.episodes=2 --seed 2").succeeds();

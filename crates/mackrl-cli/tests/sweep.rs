@@ -185,7 +185,7 @@ fn a_sweep_that_is_stopped_or_killed_leaves_no_run_behind() {
     let plan = plan(folder.path(), "\"central-v\"", "2", 1_000_000_000);
     let stopped = exits(sweep(&plan, &["--jobs", "2", "--time-limit", "1s"]), 75);
     assert!(
-        stopped.contains("interrupted when 0 of 2 runs were finished"),
+        stopped.contains("note: stopped when 0 of 2 runs were finished"),
         "{stopped}"
     );
     assert!(states(&plan).iter().all(|(state, _)| state == "stopped"));

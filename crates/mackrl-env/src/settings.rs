@@ -339,14 +339,18 @@ macro_rules! declare_words {
 
 /// Declares a section of settings: the struct, its built-in values, what it accepts and what that means.
 ///
-/// A field reads `name: type = built-in value, accepted values;`. The result is a plain struct with public fields that is
+/// A field reads `name: type = built-in value, accepted values;`, after its meaning and, if need be, how serde treats it. The result is a plain struct with public fields that is
 /// read and written by its names and refuses others.
 #[macro_export]
 macro_rules! declare_settings {
     (
         $(#[$attribute:meta])*
         $visibility:vis struct $section:ident {
-            $( $(#[doc = $meaning:literal])+ $field:ident: $type:ty = $value:expr, $accepts:expr; )+
+            $(
+                $(#[doc = $meaning:literal])+
+                $(#[serde($($how:tt)+)])?
+                $field:ident: $type:ty = $value:expr, $accepts:expr;
+            )+
         }
     ) => {
         $(#[$attribute])*
@@ -356,6 +360,7 @@ macro_rules! declare_settings {
             $(
                 $(#[doc = $meaning])+
                 #[doc = concat!("\n\nAccepts `", stringify!($accepts), "`; `", stringify!($value), "` unless set.")]
+                $(#[serde($($how)+)])?
                 $visibility $field: $type,
             )+
         }

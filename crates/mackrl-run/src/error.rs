@@ -61,8 +61,22 @@ pub enum RunError {
         /// A setting in which they differ.
         key: String,
     },
+    /// A run that was to be extended, and is planned for more.
+    #[error("{} is planned for {planned} environment steps, expected more than that", folder.display())]
+    NotFurther {
+        /// Its folder.
+        folder: PathBuf,
+        /// Environment steps that are planned.
+        planned: u64,
+    },
+    /// A run that ended and has no checkpoint from before its end.
+    #[error("{} keeps no checkpoint from before its end, from which it could go further", folder.display())]
+    NoWayFurther {
+        /// Its folder.
+        folder: PathBuf,
+    },
     /// A run that was asked to stop, and can go on.
-    #[error("{} was interrupted at {steps_env} environment steps", folder.display())]
+    #[error("{} was stopped at {steps_env} environment steps; its metrics and its latest checkpoint are kept", folder.display())]
     Interrupted {
         /// Its folder.
         folder: PathBuf,
@@ -70,7 +84,9 @@ pub enum RunError {
         steps_env: u64,
     },
     /// Many runs that were asked to stop, and can go on.
-    #[error("interrupted when {finished} of {runs} runs were finished")]
+    #[error(
+        "stopped when {finished} of {runs} runs were finished; the others keep their latest checkpoints"
+    )]
     SweepInterrupted {
         /// Runs that have reached their end.
         finished: usize,

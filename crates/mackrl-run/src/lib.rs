@@ -8,6 +8,7 @@ mod batch_system;
 pub mod bounded;
 pub mod config;
 pub mod folder;
+pub mod number;
 pub mod provenance;
 pub mod recorded;
 pub mod replay;

@@ -69,7 +69,7 @@ pub fn become_game(parent: u32, mut command: Command) -> io::Error {
         .map(|pid| pid.get().unsigned_abs())
         != Some(parent)
     {
-        return io::Error::other("whoever wanted the game is gone");
+        return io::Error::other("the process that wanted the game has ended");
     }
     command.exec()
 }

@@ -42,7 +42,8 @@ const COMBINED: &[&str] = &[
 fn words(key: &str) -> &'static [&'static str] {
     match key {
         "env.map" => &["3m", "2s3z", "2m_vs_1z"],
-        "env.scenario" => &[""],
+        // Without them, a run begins untrained.
+        "env.scenario" | "run.initial_weights" => &[""],
         "algorithm.partitions" => &["all", "round-robin", "sampled:1"],
         other => panic!("no values of {other} are known here"),
     }

@@ -2,15 +2,17 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum, builder::RangedU64ValueParser};
+use clap::{Args, ValueEnum};
 use mackrl_run::recorded::{self, Selection};
+
+use crate::args::{MOST, number};
 
 /// Draw learning curves of many runs
 ///
 /// Takes run folders and folders that hold them, such as the output of `mackrl sweep`. Runs that differ in nothing but the seed
 /// are repetitions of one experiment and become one curve, one colour an algorithm, with the number of runs in brackets. Runs that
 /// differ in anything else than seed and algorithm, in the version of the program or in map data are refused: tell them apart with
-/// --by, or insist with --mix.
+/// --by, or use them together with --mix.
 ///
 /// Each run's curve goes straight from test to test; the average is taken where tests are due, up to where the shortest run ends.
 ///
@@ -77,10 +79,10 @@ pub(crate) enum CurveStatistic {
 /// Say what many runs show together: averages with their uncertainty, comparisons, steps to a level
 ///
 /// The score of a run is the mean of the last tenth of its tests, or its curve at --at N. For each algorithm on each map: the mean
-/// with its standard error, the median and the interquartile mean, each with a 95 % stratified-bootstrap interval (percentiles,
-/// 50 000 resamples), and after how many environment steps the runs first reach 50, 70 and 90 %: the median over all runs, where
+/// with its 95 % interval by Student's t, and mean, median and interquartile mean, each with a 95 % stratified-bootstrap interval
+/// (percentiles, 50 000 resamples), and after how many environment steps the runs first reach 50, 70 and 90 %: the median over all runs, where
 /// a run that never does counts as the latest, with the number of runs that do. For each two algorithms: the probability that
-/// a run of the one scores higher than a run of the other, with its interval. With several maps the same over all of them, each
+/// a run of the one scores higher than a run of the other, with its interval, if there are 5 runs of each. With several maps the same over all of them, each
 /// resample with every map.
 ///
 /// Runs are selected and refused as by `mackrl plot`.
@@ -97,7 +99,7 @@ pub(crate) struct ReportArgs {
     pub(crate) metric: Option<String>,
 
     /// Score runs by their curve at this number of environment steps
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = number(0, MOST))]
     pub(crate) at: Option<u64>,
 
     /// Resamples of each interval
@@ -105,7 +107,7 @@ pub(crate) struct ReportArgs {
         long,
         value_name = "N",
         default_value_t = 50_000,
-        value_parser = RangedU64ValueParser::<u64>::new().range(100..=10_000_000)
+        value_parser = number(100, 10_000_000)
     )]
     pub(crate) resamples: u64,
 

@@ -4,7 +4,7 @@ use std::num::{NonZeroU64, NonZeroUsize};
 
 use clap::{Args, Subcommand};
 
-use crate::args::{ConfigurationArgs, count_to, runs::ThreadsArgs};
+use crate::args::{ConfigurationArgs, count_to, episodes, runs::ThreadsArgs};
 
 /// Measure how fast this machine is
 ///
@@ -39,7 +39,7 @@ pub(crate) struct BenchEnvironmentArgs {
     pub(crate) map: String,
 
     /// Environment steps to play, summed over threads
-    #[arg(long, value_name = "N", default_value = "100000")]
+    #[arg(long, value_name = "N", default_value = "100000", value_parser = episodes())]
     pub(crate) steps: NonZeroU64,
 
     /// Threads, each with an environment of its own

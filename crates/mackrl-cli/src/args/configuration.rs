@@ -5,10 +5,14 @@ use std::path::PathBuf;
 use clap::Args;
 use mackrl_run::{
     bounded,
-    config::{ConfigBuilder, EnvironmentConfig, Preset},
+    config::{Config, ConfigBuilder, EnvironmentConfig, Preset},
     scenario_file::with_scenario,
 };
 
+use crate::args::{MOST, number};
+
+/// The preset that is taken if none is asked for.
+const DEFAULT: &str = "default";
 /// Greatest length of a configuration in bytes; it may hold the text of a scenario, every character escaped.
 const FILE_MAX: usize = 2 << 20;
 
@@ -25,6 +29,17 @@ pub(crate) fn world(
         builder = builder.set(assignment)?;
     }
     Ok(with_scenario(builder)?.build_environment()?)
+}
+
+/// Takes the text of a scenario away that `env` has, so that another map can be named.
+pub(crate) fn without_scenario(
+    builder: ConfigBuilder,
+    env: &EnvironmentConfig,
+) -> anyhow::Result<ConfigBuilder> {
+    Ok(match env.get("scenario") {
+        Some(_) => builder.set("env.scenario=\"\"")?,
+        None => builder,
+    })
 }
 
 fn env_help() -> String {
@@ -50,7 +65,7 @@ fn preset_help() -> String {
     let names = crate::registry().presets();
     let names = names.map(|Preset { name, .. }| name.to_owned());
     format!(
-        "Shipped configuration to start from: {}",
+        "Shipped configuration to start from: {} [default: {DEFAULT}]",
         or(names.collect())
     )
 }
@@ -76,21 +91,15 @@ pub(crate) struct ConfigurationArgs {
     pub(crate) algorithm: Option<String>,
 
     /// Environment steps of training, summed over parallel environments (short for `--set run.steps_env=N`)
-    #[arg(long, value_name = "N", help_heading = "Configuration")]
+    #[arg(long, value_name = "N", help_heading = "Configuration", value_parser = number(1, MOST))]
     pub(crate) steps: Option<u64>,
 
     /// Seed from which all randomness follows (short for `--set run.seed=S`)
-    #[arg(long, value_name = "S", help_heading = "Configuration")]
+    #[arg(long, value_name = "S", help_heading = "Configuration", value_parser = number(0, MOST))]
     pub(crate) seed: Option<u64>,
 
-    #[arg(
-        long,
-        value_name = "NAME",
-        default_value = "default",
-        help_heading = "Configuration",
-        help = preset_help()
-    )]
-    pub(crate) preset: String,
+    #[arg(long, value_name = "NAME", help_heading = "Configuration", help = preset_help())]
+    pub(crate) preset: Option<String>,
 
     /// TOML file laid over the preset; it needs only the lines that it changes
     #[arg(long, value_name = "FILE", help_heading = "Configuration")]
@@ -102,9 +111,30 @@ pub(crate) struct ConfigurationArgs {
 }
 
 impl ConfigurationArgs {
+    /// The shipped configuration to start from.
+    pub(crate) fn preset(&self) -> &str {
+        self.preset.as_deref().unwrap_or(DEFAULT)
+    }
+
     /// Lays the layers over each other; `build` on the result checks ranges and gives the configuration.
     pub(crate) fn layers(&self) -> anyhow::Result<ConfigBuilder> {
-        let mut builder = ConfigBuilder::new(crate::registry()).preset(&self.preset)?;
+        self.over(ConfigBuilder::new(crate::registry()).preset(self.preset())?)
+    }
+
+    /// As [`Self::layers`], over the configuration of a run. A scenario of its own gives way to a map that is asked for.
+    pub(crate) fn over_run(&self, run: &Config) -> anyhow::Result<ConfigBuilder> {
+        let builder = ConfigBuilder::new(crate::registry());
+        let mut builder = builder.recorded("the run's config.toml", &run.to_toml())?;
+        if let Some(preset) = &self.preset {
+            builder = builder.preset(preset)?;
+        }
+        if self.map.is_some() {
+            builder = without_scenario(builder, &run.env)?;
+        }
+        self.over(builder)
+    }
+
+    fn over(&self, mut builder: ConfigBuilder) -> anyhow::Result<ConfigBuilder> {
         if let Some(path) = &self.config {
             let name = path.display().to_string();
             let text = bounded::read_text(path, FILE_MAX)?;

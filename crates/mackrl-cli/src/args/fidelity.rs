@@ -21,14 +21,9 @@ use crate::args::{EPISODES_MOST, count_to, runs::ThreadsArgs};
 /// Exit code: 0 if every row that was played passes, 1 if one does not. All numbers follow from
 /// --set and --episodes alone; the number of threads changes none.
 ///
-/// Examples:
-///   mackrl fidelity
-///   mackrl fidelity --map 25m --episodes 300
-///   mackrl fidelity --set env.units=lotv --json
-///   mackrl fidelity --html fidelity.html
-///   mackrl fidelity --markdown docs/fidelity.md
+/// Examples: mackrl fidelity; mackrl fidelity --map 25m --episodes 300; mackrl fidelity --set env.units=lotv --json;
+/// mackrl fidelity --html fidelity.html; mackrl fidelity --markdown docs/fidelity.md
 #[derive(Debug, Args)]
-#[command(verbatim_doc_comment)]
 pub(crate) struct FidelityArgs {
     /// Only the rows of this map [default: all]
     #[arg(long, value_name = "MAP")]

@@ -14,23 +14,29 @@ mod sc2;
 #[path = "without_sc2.rs"]
 mod sc2;
 mod serve;
+mod shell;
 mod sweep;
 
-use std::{num::NonZeroUsize, path::PathBuf, sync::LazyLock};
+use std::{
+    num::{NonZeroU64, NonZeroUsize},
+    path::PathBuf,
+    sync::LazyLock,
+};
 
 use clap::{Args, Parser, Subcommand};
 use mackrl::nn::InstructionSet;
 use mackrl_run::provenance::CODE;
 
 use crate::reproduce::{
-    ablations::AblationOptions, all::AllOptions, figure5::Figure5Options, figure6::Figure6Options,
+    ablations::AblationOptions, all::AllOptions, calibration::CalibrationOptions,
+    figure4_neurips::Figure4Options, figure5::Figure5Options, figure6::Figure6Options,
     figure7::Figure7Options, ppo::PpoOptions, protocol::ProtocolOptions, zoo::ZooOptions,
 };
 pub(crate) use analysis::{CurveAxis, CurveStatistic, PlotArgs, ReportArgs};
 pub(crate) use bench::{
     BenchArgs, BenchCommand, BenchEnvironmentArgs, BenchTrainArgs, BenchUpdateArgs,
 };
-pub(crate) use configuration::{ConfigurationArgs, world};
+pub(crate) use configuration::{ConfigurationArgs, without_scenario, world};
 pub(crate) use fidelity::FidelityArgs;
 pub(crate) use inquiry::DiffArgs;
 pub(crate) use play::PlayArgs;
@@ -43,6 +49,7 @@ pub(crate) use sc2::{
     UnitsChoice,
 };
 pub(crate) use serve::ServeRunsArgs;
+pub(crate) use shell::{CompletionsArgs, ManArgs};
 pub(crate) use sweep::SweepArgs;
 
 /// Teaches teams to coordinate without communicating, by acting jointly on what they commonly know.
@@ -54,7 +61,7 @@ pub(crate) use sweep::SweepArgs;
 /// difference, 2 usage, 64 a bad
 /// configuration, 65 bad data, 70 a defect of this program, 74 input or output, 75 stopped by a signal: go on with `mackrl resume`.
 #[derive(Debug, Parser)]
-#[command(name = "mackrl", version = CODE, long_version = long_version(), max_term_width = 100)]
+#[command(name = "mackrl", version = CODE, long_version = long_version(), max_term_width = 120)]
 pub(crate) struct Cli {
     #[command(subcommand)]
     pub(crate) command: Command,
@@ -62,15 +69,59 @@ pub(crate) struct Cli {
 
 /// Most episodes that can be asked for: years of them.
 const EPISODES_MOST: usize = 1_000_000_000;
+/// Most that counts without a limit of their own can be: what every configuration can hold, 2⁵³.
+pub(crate) const MOST: u64 = 1 << 53;
+
+/// Reads a whole number from `least` to `most`, as people type it, and converts it.
+fn whole<T>(
+    least: u64,
+    most: u64,
+    convert: fn(u64) -> Option<T>,
+) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync {
+    let range = if most < MOST {
+        format!("from {least} to {most}")
+    } else {
+        format!("from {least} on")
+    };
+    move |text| {
+        mackrl_run::number::whole(text)
+            .filter(|number| (least..=most).contains(number))
+            .and_then(convert)
+            .ok_or_else(|| format!("expected a whole number {range}, such as 20000, 20_000 or 2e4"))
+    }
+}
+
+/// Reads a whole number from `least` to `most`.
+pub(crate) fn number(
+    least: u64,
+    most: u64,
+) -> impl Fn(&str) -> Result<u64, String> + Clone + Send + Sync {
+    whole(least, most, Some)
+}
+
+/// Reads a whole number from `least` to `most` that counts what can be in memory.
+pub(crate) fn size(
+    least: u64,
+    most: u64,
+) -> impl Fn(&str) -> Result<usize, String> + Clone + Send + Sync {
+    whole(least, most, |number| usize::try_from(number).ok())
+}
 
 /// Reads a count from 1 to `most`, of what takes memory or time for each.
 fn count_to(most: usize) -> impl Fn(&str) -> Result<NonZeroUsize, String> + Clone + Send + Sync {
-    move |text| {
-        let count = text.parse::<NonZeroUsize>().ok();
-        count
-            .filter(|count| count.get() <= most)
-            .ok_or_else(|| format!("expected 1 to {most}"))
-    }
+    whole(1, most as u64, |number| {
+        NonZeroUsize::new(usize::try_from(number).ok()?)
+    })
+}
+
+/// Reads a number of episodes.
+fn episodes() -> impl Fn(&str) -> Result<NonZeroU64, String> + Clone + Send + Sync {
+    whole(1, EPISODES_MOST as u64, NonZeroU64::new)
+}
+
+/// Reads a count of what is done side by side.
+pub(crate) fn side_by_side(text: &str) -> Result<NonZeroUsize, String> {
+    count_to(65_536)(text)
 }
 
 /// What `--version` tells: the version, and the instructions that this machine computes with.
@@ -88,7 +139,7 @@ pub(crate) enum Command {
     Resume(ResumeArgs),
     Evaluate(EvaluateArgs),
     Certify(CertifyArgs),
-    /// Live as one agent of a trained team: learn from stdin who it is, read local views, and write actions to stdout
+    /// Act as one agent of a trained team: read its number and the weights, then local views, from stdin, and write actions to stdout
     ///
     /// `mackrl certify` starts one such process per agent.
     #[command(hide = true)]
@@ -107,6 +158,8 @@ pub(crate) enum Command {
     Config(ConfigArgs),
     Bench(BenchArgs),
     Sc2(Sc2Args),
+    Completions(CompletionsArgs),
+    Man(ManArgs),
 }
 
 /// Reproduce the figures of the paper and of this project, and judge what is said about them
@@ -127,12 +180,15 @@ pub(crate) enum Figure {
     Protocol(ProtocolOptions),
     All(AllOptions),
     Ppo(PpoOptions),
+    #[command(name = "figure4-neurips")]
+    Neurips(Figure4Options),
+    Calibration(CalibrationOptions),
     Zoo(ZooOptions),
 }
 
-/// List SMAC's maps with the sizes of their arrays, show one of them, or check a scenario of your own
+/// List SMAC's maps with what is known of them, show one of them, or check a scenario of your own
 ///
-/// The list holds the 23 maps of SMAC. Besides them, --map takes `matrix-game`, the game of the paper's Figure 5, and a scenario
+/// The list holds the 23 maps of SMAC: sides, races, kind of team, difficulty and the best results in this repository. Besides them, --map takes `matrix-game`, the game of the paper's Figure 5, and a scenario
 /// file in place of a name.
 ///
 /// A scenario is a TOML file: terrain, units, orders, and unit types of its own if wanted.

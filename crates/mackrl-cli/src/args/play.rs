@@ -8,7 +8,7 @@ use std::{
 use clap::{Args, ValueEnum};
 use mackrl_skirmish::scripted::ScriptedPolicy;
 
-use crate::args::runs::ThreadsArgs;
+use crate::args::{MOST, episodes, number, runs::ThreadsArgs, size};
 
 /// Play with a scripted team, and report or keep what happens
 ///
@@ -20,13 +20,10 @@ use crate::args::runs::ThreadsArgs;
 /// --save-replay keeps the first episode: the map, the settings, the seed, every action and a hash of the state after every
 /// step. `mackrl replay` shows it as a page or a picture. --svg draws one step of it at once.
 ///
-/// Examples:
-///   mackrl play --map 2s3z --policy focus-fire --episodes 1000 --json
-///   mackrl play --map all --policy all --episodes 1000 --out results/scripted
-///   mackrl play --map ./my.toml --policy kite --save-replay battle.replay.gz
-///   mackrl play --map 2s3z --policy nearest --svg battle.svg --step 20
+/// Examples: mackrl play --map 2s3z --policy focus-fire --episodes 1000 --json; mackrl play --map all --policy all --episodes 1000
+/// --out results/scripted; mackrl play --map ./my.toml --policy kite --save-replay battle.replay.gz; mackrl play --map 2s3z --policy
+/// nearest --svg battle.svg --step 20
 #[derive(Debug, Args)]
-#[command(verbatim_doc_comment)]
 pub(crate) struct PlayArgs {
     /// Map to play, as `mackrl maps` lists it, a scenario file ending in .toml, or `all`
     #[arg(long, value_name = "MAP", default_value = "3m")]
@@ -41,11 +38,11 @@ pub(crate) struct PlayArgs {
     pub(crate) policy: PolicyChoice,
 
     /// Episodes to play
-    #[arg(long, value_name = "N", default_value = "100")]
+    #[arg(long, value_name = "N", default_value = "100", value_parser = episodes())]
     pub(crate) episodes: NonZeroU64,
 
     /// Seed from which all randomness follows
-    #[arg(long, value_name = "S", default_value = "1")]
+    #[arg(long, value_name = "S", default_value = "1", value_parser = number(0, u64::MAX))]
     pub(crate) seed: u64,
 
     /// One setting of the game, such as `env.sight_range=7`; repeatable
@@ -72,7 +69,7 @@ pub(crate) struct PlayArgs {
     pub(crate) svg: Option<PathBuf>,
 
     /// Step that --svg draws, counted from 0, the start [default: half of the episode]
-    #[arg(long, value_name = "T", requires = "svg")]
+    #[arg(long, value_name = "T", requires = "svg", value_parser = size(0, MOST))]
     pub(crate) step: Option<usize>,
 }
 

@@ -5,7 +5,7 @@ use std::{num::NonZeroUsize, path::PathBuf};
 use clap::Args;
 use mackrl_run::run_folder::WhichWeights;
 
-use crate::args::{ConfigurationArgs, EPISODES_MOST, count_to};
+use crate::args::{ConfigurationArgs, EPISODES_MOST, MOST, count_to, number, side_by_side, size};
 
 /// Train a team, and write its weights, metrics and configuration into a run folder
 ///
@@ -20,7 +20,11 @@ use crate::args::{ConfigurationArgs, EPISODES_MOST, count_to};
 ///
 /// SIGINT (Ctrl-C), SIGTERM and SIGUSR1 write a checkpoint and stop with exit code 75; a second SIGINT stops at once.
 ///
-/// Example: mackrl train --map 3m --algorithm mackrl --preset paper --seed 1
+/// --from copies the weights into initial.safetensors and their hash into the configuration. Everything else begins anew: steps,
+/// exploration, optimisers. Sizes of map and networks have to be the same.
+///
+/// Examples: mackrl train --map 3m --algorithm mackrl --preset paper --seed 1;
+/// mackrl train --from runs/3m-mackrl-ppo-seed1 --checkpoint best --map my.toml --steps 1e6 --out runs/mine
 #[derive(Debug, Args)]
 pub(crate) struct TrainArgs {
     #[command(flatten)]
@@ -30,6 +34,14 @@ pub(crate) struct TrainArgs {
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
 
+    /// Begin with the weights of this run, and with its configuration in place of a preset; the other flags are laid over it
+    #[arg(long, value_name = "RUN")]
+    pub(crate) from: Option<PathBuf>,
+
+    /// Weights of that run to begin with: last, best, or a number of steps at which it kept some
+    #[arg(long, value_name = "WHICH", requires = "from", default_value_t)]
+    pub(crate) checkpoint: WhichWeights,
+
     #[command(flatten)]
     pub(crate) threads: ThreadsArgs,
 
@@ -38,18 +50,27 @@ pub(crate) struct TrainArgs {
     pub(crate) json: bool,
 }
 
-/// Continue an interrupted run, to the byte as if it had never stopped
+/// Continue an interrupted run, to the byte as if it had never stopped, or make a run longer
 ///
 /// Starts at the latest intact checkpoint, whatever stopped the run: a signal, a kill, a full disk, a loss of power. Weights,
 /// checkpoints and metrics (those under sys/ aside) become those of an uninterrupted run, on any number of threads.
 ///
-/// Example: mackrl resume runs/3m-mackrl-ppo-seed1
+/// --steps N makes a run longer than it was planned, finished or not. What it learns is what a run of N steps learns from its
+/// beginning, to the byte, because no schedule depends on how long a run is planned: exploration, learning rates and weights of
+/// entropy have lengths of their own, such as `algorithm.schedule_steps_env`. It goes on from the latest checkpoint before its former
+/// end, since the test at that end is none of the longer run. run.json keeps the former plan.
+///
+/// Examples: mackrl resume runs/3m-mackrl-ppo-seed1; mackrl resume runs/3m-mackrl-ppo-seed1 --steps 2e6
 #[derive(Debug, Args)]
 pub(crate) struct ResumeArgs {
     /// Run folder that `mackrl train` wrote
     #[arg(value_name = "DIR")]
     pub(crate) run: PathBuf,
 
+    /// Go on to this number of environment steps, more than were planned
+    #[arg(long, value_name = "N", value_parser = number(1, MOST))]
+    pub(crate) steps: Option<u64>,
+
     #[command(flatten)]
     pub(crate) threads: ThreadsArgs,
 
@@ -57,18 +78,19 @@ pub(crate) struct ResumeArgs {
     #[arg(long)]
     pub(crate) json: bool,
 
-    /// Stop as after a signal when stdin ends: whoever holds its other end has ended, however that came
+    /// Stop as after a signal when stdin ends: the process that holds its other end has ended, however that came
     #[arg(long, hide = true)]
     pub(crate) leashed: bool,
 }
 
 /// Play greedy episodes with a trained team and report how it does
 ///
-/// Says first how often it wins, then prints mean and standard error of battles won, return and episode length. Without
-/// --checkpoint the last weights play; if those that did best in a test are better by more than chance, that is said.
+/// Says first how often it wins, then prints mean and standard error of what else the world counts, and what the controllers did.
+/// Without --checkpoint the last weights play; if those that did best in a test are better by more than chance, that is said.
 /// --save-replays keeps some of the episodes, with all that the controllers computed; `mackrl replay` and `mackrl explain` show them.
 ///
-/// Examples: mackrl evaluate runs/3m-mackrl-ppo-seed1 --save-replays 3; mackrl evaluate runs/3m-mackrl-ppo-seed1 --checkpoint best --json
+/// Examples: mackrl evaluate runs/3m-mackrl-ppo-seed1 --save-replays 3; mackrl evaluate runs/3m-mackrl-ppo-seed1 --checkpoint best --json;
+/// mackrl evaluate runs/3m-mackrl-ppo-seed1 --map my.toml --episodes-out episodes.csv
 #[derive(Debug, Args)]
 pub(crate) struct EvaluateArgs {
     /// Run folder that `mackrl train` wrote
@@ -83,11 +105,20 @@ pub(crate) struct EvaluateArgs {
     pub(crate) episodes: NonZeroUsize,
 
     /// Seed of the episodes [default: the run's own]
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = number(0, u64::MAX))]
     pub(crate) seed: Option<u64>,
 
+    /// Play on this map, as `mackrl maps` lists it, or scenario file; its sizes have to be those of the map of training, and all
+    /// other settings stay [default: the map of training]
+    #[arg(long, value_name = "MAP")]
+    pub(crate) map: Option<String>,
+
+    /// Write a row for each episode into this file: as JSON lines if it ends in .jsonl, as CSV if it ends in .csv
+    #[arg(long, value_name = "FILE")]
+    pub(crate) episodes_out: Option<PathBuf>,
+
     /// Keep the first N of the episodes as DIR/replays/seedS-episodeI.replay.gz, after the name of weights that are not the last
-    #[arg(long, value_name = "N", default_value = "0", hide_default_value = true)]
+    #[arg(long, value_name = "N", default_value = "0", hide_default_value = true, value_parser = size(0, MOST))]
     pub(crate) save_replays: usize,
 
     #[command(flatten)]
@@ -104,8 +135,8 @@ pub(crate) struct EvaluateArgs {
 /// compares every action, every input of a controller and every log-probability with the central run, bit for bit: sampled and
 /// greedy, for whole episodes. On Linux the system ends a process that tries to reach anything else. Then repeats the
 /// central run in worlds in which everything that an agent does not see is replaced by noise, alters the world's state beyond
-/// its sight, and draws from another key; what is computed for the agent has to stay the same. Says in a sentence what was
-/// proved, and what was not. Exit code 1 and the first counter-example if anything differs.
+/// its sight, and draws from another key; what is computed for the agent has to stay the same. Says what was certified in its
+/// first sentence, and what was not. Exit code 1 and the first counter-example if anything differs.
 ///
 /// Example: mackrl certify runs/3m-mackrl-ppo-seed1 --episodes 100 --html certificate.html
 #[derive(Debug, Args)]
@@ -122,7 +153,7 @@ pub(crate) struct CertifyArgs {
     pub(crate) episodes: NonZeroUsize,
 
     /// Seed of the episodes [default: the run's own]
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = number(0, u64::MAX))]
     pub(crate) seed: Option<u64>,
 
     /// Write the certificate into this file too, as one page
@@ -146,7 +177,7 @@ pub(crate) struct WeightsArgs {
 #[derive(Debug, Args)]
 pub(crate) struct ThreadsArgs {
     /// Threads to use; changes no result [default: all cores]
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", value_parser = side_by_side)]
     threads: Option<NonZeroUsize>,
 }
 

@@ -4,7 +4,7 @@ use std::{net::IpAddr, num::NonZeroU64, path::PathBuf};
 
 use clap::{Args, Subcommand, ValueEnum};
 
-use super::play::PolicyChoice;
+use super::{episodes, number, play::PolicyChoice};
 
 /// Play on StarCraft II itself, or let StarCraft's clients play on the built-in simulator
 ///
@@ -33,7 +33,7 @@ pub(crate) enum Sc2Command {
     ExecGame(ExecGameArgs),
 }
 
-/// Check whether StarCraft II can be played on here, and name the command that mends what is wrong
+/// Check whether StarCraft II can be played on here, and name the command that repairs what is wrong
 ///
 /// Looks for the folder, the version, the program, SMAC's maps and a free port; with --start it also starts the game, makes a map
 /// and compares its ground and its units' statistics with the simulator's.
@@ -91,11 +91,11 @@ pub(crate) struct RecordArgs {
     pub(crate) policy: PolicyChoice,
 
     /// Episodes to play
-    #[arg(long, value_name = "N", default_value = "1")]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = episodes())]
     pub(crate) episodes: NonZeroU64,
 
     /// Seed of the episodes
-    #[arg(long, value_name = "S", default_value = "1")]
+    #[arg(long, value_name = "S", default_value = "1", value_parser = number(0, u64::MAX))]
     pub(crate) seed: u64,
 
     /// Version of the game, such as 4.10.0 [default: the latest]
@@ -161,7 +161,7 @@ pub(crate) struct ServeArgs {
     pub(crate) units: UnitsChoice,
 
     /// Seed of games for which the client names none [default: the number of the process]
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = number(0, u64::MAX))]
     pub(crate) seed: Option<u64>,
 
     /// Misbehave on purpose, such as rate=0.01,seed=7,late=1.5,kinds=hang+close

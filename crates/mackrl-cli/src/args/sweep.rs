@@ -4,7 +4,7 @@ use std::{num::NonZeroUsize, path::PathBuf, time::Duration};
 
 use clap::{Args, ValueEnum};
 
-use crate::args::runs::ThreadsArgs;
+use crate::args::{MOST, count_to, runs::ThreadsArgs, side_by_side, size};
 
 /// Make many runs: algorithms by maps by seeds, by any settings
 ///
@@ -31,17 +31,17 @@ pub(crate) struct SweepArgs {
     pub(crate) out: Option<PathBuf>,
 
     /// Runs at a time, each on one thread; with --slurm, the cores of an array task [default: all cores]
-    #[arg(long, value_name = "K", conflicts_with = "list")]
+    #[arg(long, value_name = "K", conflicts_with = "list", value_parser = side_by_side)]
     jobs: Option<NonZeroUsize>,
 
     /// Make the run with this number alone, in this process, or with --block the block of this number; --list shows the
     /// numbers, which begin with 0
-    #[arg(long, value_name = "I", conflicts_with_all = ["list", "slurm"])]
+    #[arg(long, value_name = "I", conflicts_with_all = ["list", "slurm"], value_parser = size(0, MOST))]
     pub(crate) index: Option<usize>,
 
     /// Runs that --index stands for, and that an array task of --slurm makes [default of --slurm: some ten minutes' work for
     /// all its cores]
-    #[arg(long, value_name = "N", conflicts_with = "list")]
+    #[arg(long, value_name = "N", conflicts_with = "list", value_parser = count_to(1_000_000))]
     pub(crate) block: Option<NonZeroUsize>,
 
     /// Make the runs in DIR, on a disk of this machine; their run folders get every checkpoint
@@ -72,7 +72,7 @@ pub(crate) struct SweepArgs {
     #[arg(long)]
     pub(crate) json: bool,
 
-    /// Stop as after a signal when stdin ends: whoever holds its other end has ended, however that came
+    /// Stop as after a signal when stdin ends: the process that holds its other end has ended, however that came
     #[arg(long, hide = true)]
     pub(crate) leashed: bool,
 }

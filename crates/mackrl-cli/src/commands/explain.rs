@@ -4,7 +4,7 @@ use crate::{
     args::ExplainArgs,
     failure::Failure,
     output,
-    replay::{Explanation, Opened},
+    replay::{About, Explanation, Opened},
 };
 
 /// Prints the facts of one step.
@@ -18,7 +18,16 @@ pub(crate) fn run(args: &ExplainArgs) -> anyhow::Result<()> {
         );
         return Err(Failure::Usage { message }.into());
     }
-    let explanation = Explanation::of(&opened, args.step);
+    let name = |typed: &[String]| -> Result<Vec<String>, Failure> {
+        let agents = opened.group(typed)?.into_iter();
+        Ok(agents.map(|agent| opened.names.agent(agent)).collect())
+    };
+    let about = match &args.agent {
+        Some(agent) => About::Agent(name(std::slice::from_ref(agent))?.concat()),
+        None if args.group.is_empty() => About::All,
+        None => About::Group(name(&args.group)?),
+    };
+    let explanation = Explanation::of(&opened, args.step).only(&about);
     if args.json {
         output::print_json(&explanation)
     } else {

@@ -25,6 +25,8 @@ pub(crate) mod sc2;
 #[path = "without_sc2.rs"]
 pub(crate) mod sc2;
 pub(crate) mod serve;
+pub(crate) mod shell;
+mod sizes;
 pub(crate) mod sweep;
 pub(crate) mod train;
 
@@ -47,7 +49,7 @@ fn this_program() -> anyhow::Result<PathBuf> {
 /// Says that runs were left out, or that rows of a run are missing, if some are.
 fn note_left_out(grouping: &Grouping) {
     if grouping.left_out > 0 {
-        // The result is the same whether anybody reads this or not.
+        // The result is the same whether this can be written or not.
         let _ = writeln!(
             io::stderr(),
             "note: {} runs are not finished and left out; --unfinished uses them as far as they have come",

@@ -14,7 +14,7 @@ use crate::{
     args::{CurveAxis, CurveStatistic, PlotArgs},
     failure::Failure,
     output,
-    plot::{Axis, Colour, Corner, LineChart, Mark, Point, Series},
+    plot::{Axis, Colour, LineChart, Mark, Point, Series},
 };
 
 /// Resamples of each interval along a curve: there are hundreds of them, and a pixel is all that they have to be right to.
@@ -186,7 +186,6 @@ fn chart(
             label,
             range: y_range,
         },
-        legend: Corner::emptiest(&series, y_range),
         series,
     }
 }

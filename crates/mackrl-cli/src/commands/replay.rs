@@ -1,10 +1,10 @@
-//! `mackrl replay`: pages and pictures of a recorded episode.
+//! `mackrl replay`: pages, pictures and films of a recorded episode.
 
 use crate::{
     args::ReplayArgs,
     failure::Failure,
     output,
-    replay::{Opened, picture},
+    replay::{Opened, film, picture},
 };
 
 /// Plays a replay again, writes what was asked for, and says how the episode went.
@@ -14,8 +14,10 @@ pub(crate) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
             Failure::usage("--step says what --svg or --html shows, and neither is given").into(),
         );
     }
-    if !args.group.is_empty() && args.svg.is_none() {
-        return Err(Failure::usage("--group says what --svg shows, which is not given").into());
+    if !args.group.is_empty() && args.svg.is_none() && args.gif.is_none() {
+        return Err(
+            Failure::usage("--group says what --svg or --gif shows, and neither is given").into(),
+        );
     }
     let opened = Opened::read(&args.file)?;
     let group = opened.group(&args.group)?;
@@ -27,6 +29,9 @@ pub(crate) fn run(args: &ReplayArgs) -> anyhow::Result<()> {
     if let Some(file) = &args.svg {
         let picture = picture(&opened, step, &group);
         output::write_file(file, picture.to_svg().as_bytes())?;
+    }
+    if let Some(file) = &args.gif {
+        output::write_file(file, &film(&opened, &group)?)?;
     }
     let summary = opened.summary();
     if args.json {

@@ -9,6 +9,7 @@ use std::{
 
 use mackrl_run::{
     RunError,
+    run_folder::{self, Extension},
     stop_request::StopRequest,
     sweep::{self, Entry, Making, Outcome},
     training_loop::{self, Summary},
@@ -29,6 +30,9 @@ pub(crate) fn run(args: &ResumeArgs) -> anyhow::Result<()> {
     if args.leashed {
         signals::stop_when_stdin_ends(&stop);
     }
+    if let Some(steps) = args.steps {
+        extend(&args.run, steps)?;
+    }
     let gone_on = go_on(&args.run, args.threads.count(), &stop);
     let gone_on = match gone_on {
         Err(error) if args.leashed => return Err(or_made_elsewhere(error)),
@@ -38,6 +42,23 @@ pub(crate) fn run(args: &ResumeArgs) -> anyhow::Result<()> {
         Some(summary) => print(&summary, args.json),
         None => Ok(()),
     }
+}
+
+/// Plans the run at `path` for `steps` environment steps, and says where it goes on.
+fn extend(path: &Path, steps: u64) -> Result<(), RunError> {
+    let Some(Extension { planned, from }) = run_folder::extend(path, steps)? else {
+        return Ok(());
+    };
+    let folder = printable(&path.display().to_string());
+    let place = match from {
+        0 => "begins again, since it has no checkpoint from before its end".to_owned(),
+        from => format!("goes on from step {from}, its latest checkpoint before that end"),
+    };
+    let _ = writeln!(
+        io::stderr(),
+        "{folder} was planned for {planned} environment steps and is now for {steps}: it {place}"
+    );
+    Ok(())
 }
 
 /// Continues the run at `path` to its end; gives nothing if it is there already.

@@ -2,22 +2,27 @@
 
 use std::path::{Path, PathBuf};
 
+use anyhow::Context;
 use mackrl::nn::InstructionSet;
 use mackrl_run::{
     config::Config,
-    run_folder::{RunFolder, read_description},
-    training::Teams,
+    provenance::sha256,
+    run_folder::{InitialSource, InitialWeights, Run, RunFolder, WhichWeights, read_description},
+    training::{
+        Teams,
+        assembly::{self, RunWorld},
+    },
     training_loop::{self, Summary},
 };
 use mackrl_skirmish::SKIRMISH;
 
 use crate::{
     args::TrainArgs,
-    commands::sc2,
+    commands::{sc2, sizes},
     output,
     progress::RunProgress,
     signals,
-    words::{between, did},
+    words::{BATTLE_WON, between, did},
 };
 
 /// How many of the latest tests are spoken of.
@@ -25,18 +30,77 @@ const TESTS_SHOWN: usize = 5;
 
 /// Trains a team. Everything that can be wrong with what was typed is found before the run folder is created.
 pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<()> {
-    let resolved = args.configuration.layers()?.resolve()?;
-    let config = resolved.config().clone();
+    let source = match &args.from {
+        Some(run) => Some(Run::open(run, args.checkpoint)?),
+        None => None,
+    };
+    let layers = match &source {
+        Some(run) => args.configuration.over_run(&run.config)?,
+        None => args.configuration.layers()?,
+    };
+    let resolved = layers.resolve()?;
+    let mut config = resolved.config().clone();
     let path = args.out.clone().unwrap_or_else(|| default_folder(&config));
     RunFolder::check_free(&path)?;
     let stop = signals::listen()?;
     let world = sc2::world(&config)?;
+    let initial = match (&args.from, &source) {
+        (Some(folder), Some(run)) => {
+            let initial = initial_weights(folder, args.checkpoint, run);
+            check_weights(folder, run, &config, &world)?;
+            config.run.initial_weights = sha256(&initial.bytes);
+            Some(initial)
+        }
+        _ => None,
+    };
     let threads = args.threads.count();
     let mut progress = RunProgress::new();
     let why = resolved.origin("algorithm.name");
     progress.announce(&config, &why, InstructionSet::chosen()?, threads);
-    let summary = training_loop::train(&path, &config, &world, threads, &stop, &mut progress)?;
+    let summary = training_loop::train_from(
+        &path,
+        &config,
+        initial.as_ref(),
+        &world,
+        threads,
+        &stop,
+        &mut progress,
+    )?;
     print(&summary, args.json)
+}
+
+/// The weights that `--from` asks for, and where they come from.
+fn initial_weights(folder: &Path, checkpoint: WhichWeights, run: &Run) -> InitialWeights {
+    InitialWeights {
+        bytes: run.weights.clone(),
+        source: InitialSource {
+            run: folder.display().to_string(),
+            checkpoint,
+            steps_env: run.steps_env(),
+        },
+    }
+}
+
+/// Refuses weights with which the run cannot begin, before anything is made.
+fn check_weights(
+    folder: &Path,
+    run: &Run,
+    config: &Config,
+    world: &RunWorld,
+) -> anyhow::Result<()> {
+    let shown = folder.display().to_string();
+    let asked = format!("train on {}", config.env.map());
+    sizes::expect_same(&run.config, world, (&asked, &shown))?;
+    let [own, wanted] = [&run.config, config].map(|config| config.algorithm.name());
+    assembly::trained(config, world, &run.weights).with_context(|| {
+        let algorithms = if own == wanted {
+            String::new()
+        } else {
+            format!(", which {own} trained, with {wanted}")
+        };
+        format!("cannot begin with the weights of {shown}{algorithms}")
+    })?;
+    Ok(())
 }
 
 /// Prints what a finished run says of itself: how its team plays, then what it cost, then what to do next.
@@ -46,13 +110,30 @@ pub(super) fn print(summary: &Summary, json: bool) -> anyhow::Result<()> {
     }
     let folder = summary.folder.display();
     output::print(&format!(
-        "{}{folder}: {} environment steps in {:.1} s ({:.0} a second)\nnext: mackrl evaluate {folder}{}\n",
+        "{}{}{folder}: {} environment steps in {:.1} s ({:.0} a second)\nnext: mackrl evaluate {folder}{}\n",
         playing(&summary.teams, &summary.tests),
+        meaning(summary),
         summary.steps_env,
         summary.wall_s,
         summary.steps_per_s,
         flags(summary),
     ))
+}
+
+/// What a measure means that is not the winning of battles, where the world says so.
+fn meaning(summary: &Summary) -> String {
+    let measure = &summary.teams.measure;
+    let described = read_description(&summary.folder).ok();
+    let world = described.and_then(|(config, _)| config.env.simulated().world().ok());
+    let told = world.filter(|_| measure != BATTLE_WON).and_then(|world| {
+        let mut declared = world.spec().statistics.iter();
+        let meaning = declared
+            .find(|statistic| statistic.name == **measure)?
+            .meaning
+            .clone();
+        Some(format!("({measure}: {meaning}.)\n"))
+    });
+    told.unwrap_or_default()
 }
 
 /// What is worth adding to the next command: the better weights, or battles to look at, if they can be had.

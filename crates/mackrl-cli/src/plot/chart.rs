@@ -15,8 +15,6 @@ pub(crate) struct LineChart {
     pub(crate) y_axis: Axis,
     /// Drawn in order: later ones lie on top.
     pub(crate) series: Vec<Series>,
-    /// Where the legend stands inside the axes; choose the emptiest.
-    pub(crate) legend: Corner,
 }
 
 /// One axis.
@@ -26,58 +24,6 @@ pub(crate) struct Axis {
     pub(crate) label: String,
     /// Lowest and highest number shown; `None` fits the data.
     pub(crate) range: Option<[f64; 2]>,
-}
-
-/// A corner of the plotting area.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Corner {
-    /// Top left.
-    UpperLeft,
-    /// Top right.
-    UpperRight,
-    /// Bottom left.
-    LowerLeft,
-    /// Bottom right.
-    LowerRight,
-}
-
-impl Corner {
-    /// The corner of the plot in which the fewest points lie, bands included: axes that fit the data are assumed where
-    /// `y_range` is `None`.
-    #[must_use]
-    pub(crate) fn emptiest(series: &[Series], y_range: Option<[f64; 2]>) -> Self {
-        let points = || series.iter().flat_map(|series| &series.points);
-        let xs = extent(points().map(|point| point.x));
-        let ys = y_range.unwrap_or_else(|| extent(points().flat_map(|point| point.band)));
-        let [middle_x, middle_y] = [xs, ys].map(|[low, high]| f64::midpoint(low, high));
-        let crowd = |corner: &Self| {
-            let inside = |point: &&Point| {
-                let [low, high] = point.band;
-                match corner {
-                    Self::LowerRight => point.x >= middle_x && low < middle_y,
-                    Self::UpperLeft => point.x <= middle_x && high > middle_y,
-                    Self::UpperRight => point.x >= middle_x && high > middle_y,
-                    Self::LowerLeft => point.x <= middle_x && low < middle_y,
-                }
-            };
-            points().filter(inside).count()
-        };
-        let corners = [
-            Self::LowerRight,
-            Self::UpperLeft,
-            Self::UpperRight,
-            Self::LowerLeft,
-        ];
-        let emptiest = corners.into_iter().min_by_key(crowd);
-        emptiest.unwrap_or(Self::LowerRight)
-    }
-}
-
-/// Lowest and highest of some numbers.
-fn extent(numbers: impl Iterator<Item = f64>) -> [f64; 2] {
-    numbers.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], number| {
-        [low.min(number), high.max(number)]
-    })
 }
 
 /// Points that belong together.

@@ -1,20 +1,21 @@
 //! Where everything stands: from a chart to a scene.
 
 use super::{
-    chart::{Colour, Corner, LineChart, Mark, Point, Series},
+    chart::{Colour, LineChart, Mark, Point, Series},
+    legend::{self, Entry, Legend},
     scale::Scale,
-    scene::{Anchor, Direction, Panel, Rectangle, Scene, Shape, Weight, Words},
+    scene::{Anchor, Direction, Panel, Rectangle, Scene, Shape, Stroke, Weight, Words, pixels},
     text,
 };
 
 const WIDTH: u16 = 720;
-const HEIGHT: u16 = 480;
+/// Height of the plotting area.
+const AREA_HEIGHT: f64 = 360.0;
 pub(super) const MARGIN: f64 = 20.0;
 pub(super) const TITLE_SIZE: f64 = 17.0;
 pub(super) const SUBTITLE_SIZE: f64 = 12.0;
 pub(super) const LABEL_SIZE: f64 = 13.0;
 pub(super) const TICK_SIZE: f64 = 12.0;
-const LEGEND_ROW: f64 = 19.0;
 pub(super) const SAMPLE_WIDTH: f64 = 25.0;
 const LINE_WIDTH: f64 = 2.25;
 const DASHES_WIDTH: f64 = 1.25;
@@ -23,7 +24,6 @@ const BAND_OPACITY: f64 = 0.18;
 /// Share of a font's size by which a base line lies below the middle of its lower-case letters.
 pub(super) const MIDDLE: f64 = 0.35;
 
-const WHITE: Colour = Colour(0xFF, 0xFF, 0xFF);
 pub(super) const INK: Colour = Colour(0x22, 0x22, 0x22);
 pub(super) const FAINT_INK: Colour = Colour(0x5A, 0x5A, 0x5A);
 const GRID: Colour = Colour(0xE4, 0xE4, 0xE4);
@@ -40,14 +40,27 @@ pub(super) fn lay_out(chart: &LineChart) -> Scene {
     let x = scale(chart.x_axis.range, 6.0, points().map(|point| point.x));
     let heights = points().flat_map(|point| point.band);
     let y = scale(chart.y_axis.range, 7.0, heights);
-    let area = plot_area(chart, &y);
+    let left = MARGIN + LABEL_SIZE + 12.0 + widest_label(&y) + 8.0;
+    let right = f64::from(WIDTH) - MARGIN - 8.0;
+    let head = head(
+        [&chart.title, &chart.subtitle],
+        &chart.series,
+        [left, right],
+    );
+    let area = Rectangle {
+        left,
+        top: head.height,
+        right,
+        bottom: head.height + AREA_HEIGHT,
+    };
     let axes = Axes {
         x: x.onto(area.left, area.right),
         y: y.onto(area.bottom, area.top),
     };
-    let mut foreground = axis_words(chart, area, &axes);
-    foreground.extend(titles(&chart.title, &chart.subtitle, area.left));
-    foreground.extend(legend(chart, area));
+    let height = area.bottom + TICK_SIZE + 18.0 + LABEL_SIZE + MARGIN;
+    let mut foreground = rings(&chart.series, &axes, area);
+    foreground.extend(axis_words(chart, area, &axes, height));
+    foreground.extend(head.shapes);
     let panel = Panel {
         area,
         background: grid(area, &axes),
@@ -56,7 +69,7 @@ pub(super) fn lay_out(chart: &LineChart) -> Scene {
     };
     Scene {
         width: WIDTH,
-        height: HEIGHT,
+        height: pixels(height),
         panels: vec![panel],
     }
 }
@@ -73,17 +86,6 @@ pub(super) fn scale(
     )
 }
 
-fn plot_area(chart: &LineChart, y: &Scale) -> Rectangle {
-    let widest = widest_label(y);
-    let subtitle = if chart.subtitle.is_empty() { 0.0 } else { 19.0 };
-    Rectangle {
-        left: MARGIN + LABEL_SIZE + 12.0 + widest + 8.0,
-        top: MARGIN + TITLE_SIZE + 12.0 + subtitle,
-        right: f64::from(WIDTH) - MARGIN - 8.0,
-        bottom: f64::from(HEIGHT) - MARGIN - LABEL_SIZE - 12.0 - TICK_SIZE - 6.0,
-    }
-}
-
 /// Width of the widest label of an axis.
 pub(super) fn widest_label(scale: &Scale) -> f64 {
     (scale.ticks().iter())
@@ -97,7 +99,7 @@ pub(super) fn grid(area: Rectangle, axes: &Axes) -> Vec<Shape> {
         points,
         colour,
         width: 1.0,
-        dashed: false,
+        stroke: Stroke::Solid,
     };
     let mut shapes: Vec<Shape> = (axes.y.ticks().into_iter())
         .map(|(value, _)| {
@@ -116,13 +118,10 @@ pub(super) fn grid(area: Rectangle, axes: &Axes) -> Vec<Shape> {
     shapes
 }
 
-fn axis_words(chart: &LineChart, area: Rectangle, axes: &Axes) -> Vec<Shape> {
+fn axis_words(chart: &LineChart, area: Rectangle, axes: &Axes, height: f64) -> Vec<Shape> {
     let mut shapes = ticks_below(area, &axes.x);
     shapes.extend(ticks_beside(area, &axes.y));
-    let below = [
-        f64::midpoint(area.left, area.right),
-        f64::from(HEIGHT) - MARGIN,
-    ];
+    let below = [f64::midpoint(area.left, area.right), height - MARGIN];
     shapes.push(label(&chart.x_axis.label, below, Direction::Rightwards));
     let beside = [MARGIN + LABEL_SIZE, f64::midpoint(area.top, area.bottom)];
     shapes.push(label(&chart.y_axis.label, beside, Direction::Upwards));
@@ -165,28 +164,53 @@ pub(super) fn label(text: &str, at: [f64; 2], direction: Direction) -> Shape {
     })
 }
 
-/// What stands above a chart.
-pub(super) fn titles(title: &str, subtitle: &str, left: f64) -> [Shape; 2] {
+/// What stands above a chart from the picture's upper edge on: title, subtitle and legend.
+pub(super) fn head([title, subtitle]: [&str; 2], series: &[Series], ends: [f64; 2]) -> Legend {
+    let left = ends[0];
     let base = MARGIN + TITLE_SIZE * 0.8;
     let title = Words {
         weight: Weight::Medium,
         ..words(title.to_owned(), [left, base], TITLE_SIZE, INK)
     };
-    let at = [left, base + 19.0];
+    let below = if subtitle.is_empty() { 0.0 } else { 19.0 };
+    let at = [left, base + below];
     let subtitle = words(subtitle.to_owned(), at, SUBTITLE_SIZE, FAINT_INK);
-    [title, subtitle].map(Shape::Words)
+    let named = series
+        .iter()
+        .filter_map(|series| Some((series, series.name.as_deref()?)));
+    let entries = named.map(|(series, name)| Entry::new(SAMPLE_WIDTH, name, sample(series)));
+    let top = base + below + 8.0;
+    let mut head = legend::flow(entries.collect(), ends, top);
+    head.shapes.extend([title, subtitle].map(Shape::Words));
+    head.height += top + 10.0;
+    head
 }
 
-/// Bands below, lines and marks above.
+/// Bands below, lines above.
 pub(super) fn data(series: &[Series], axes: &Axes) -> Vec<Shape> {
     let bands = series.iter().filter_map(|series| band(series, axes));
-    let marks = series.iter().flat_map(|series| {
-        let places = (series.points.iter())
-            .map(|point| [axes.x.place(point.x), axes.y.place(point.y)])
-            .collect();
-        marks(series, places)
-    });
-    bands.chain(marks).collect()
+    let lines = series.iter().filter(|series| series.mark != Mark::Rings);
+    let lines = lines.flat_map(|series| marks(series, places(series, axes)));
+    bands.chain(lines).collect()
+}
+
+/// The rings of which the centre is in the plotting area, its edge included: a ring at the edge is not cut.
+pub(super) fn rings(series: &[Series], axes: &Axes, area: Rectangle) -> Vec<Shape> {
+    let rings = series.iter().filter(|series| series.mark == Mark::Rings);
+    rings
+        .flat_map(|series| {
+            let mut places = places(series, axes);
+            places.retain(|place| area.holds(*place));
+            marks(series, places)
+        })
+        .collect()
+}
+
+fn places(series: &Series, axes: &Axes) -> Vec<[f64; 2]> {
+    let points = series.points.iter();
+    points
+        .map(|point| [axes.x.place(point.x), axes.y.place(point.y)])
+        .collect()
 }
 
 fn band(series: &Series, axes: &Axes) -> Option<Shape> {
@@ -204,15 +228,15 @@ fn band(series: &Series, axes: &Axes) -> Option<Shape> {
 
 fn marks(series: &Series, places: Vec<[f64; 2]>) -> Vec<Shape> {
     let colour = series.colour;
-    let line = |width, dashed| Shape::Line {
+    let line = |width, stroke| Shape::Line {
         points: places.clone(),
         colour,
         width,
-        dashed,
+        stroke,
     };
     match series.mark {
-        Mark::Line => vec![line(LINE_WIDTH, false)],
-        Mark::Dashes => vec![line(DASHES_WIDTH, true)],
+        Mark::Line => vec![line(LINE_WIDTH, Stroke::Solid)],
+        Mark::Dashes => vec![line(DASHES_WIDTH, Stroke::Dashed)],
         Mark::Rings => (places.iter())
             .map(|&centre| Shape::Ring {
                 centre,
@@ -224,64 +248,19 @@ fn marks(series: &Series, places: Vec<[f64; 2]>) -> Vec<Shape> {
     }
 }
 
-fn legend(chart: &LineChart, area: Rectangle) -> Vec<Shape> {
-    let rows: Vec<(&Series, &str)> = (chart.series.iter())
-        .filter_map(|series| series.name.as_deref().map(|name| (series, name)))
-        .collect();
-    let widest = (rows.iter())
-        .map(|(_, name)| text::width(name, TICK_SIZE, Weight::Regular))
-        .fold(0.0, f64::max);
-    let (width, height) = (
-        SAMPLE_WIDTH + 8.0 + widest + 20.0,
-        rows.len() as f64 * LEGEND_ROW + 10.0,
-    );
-    let left = match chart.legend {
-        Corner::UpperLeft | Corner::LowerLeft => area.left + 10.0,
-        Corner::UpperRight | Corner::LowerRight => area.right - 6.0 - width,
-    };
-    let top = match chart.legend {
-        Corner::UpperLeft | Corner::UpperRight => area.top + 6.0,
-        Corner::LowerLeft | Corner::LowerRight => area.bottom - 10.0 - height,
-    };
-    let paper = Rectangle {
-        left,
-        top,
-        right: match chart.legend {
-            Corner::UpperLeft | Corner::LowerLeft => left + width,
-            // To the edge, lest stubs of grid lines stick out behind the legend.
-            Corner::UpperRight | Corner::LowerRight => area.right,
-        },
-        bottom: top + height,
-    };
-    let mut shapes = vec![Shape::Polygon {
-        points: paper.corners().to_vec(),
-        colour: WHITE,
-        opacity: 0.9,
-    }];
-    for (row, (series, name)) in rows.into_iter().enumerate() {
-        let middle = top + 5.0 + (row as f64 + 0.5) * LEGEND_ROW;
-        let start = left + 10.0;
-        shapes.extend(sample(series, start, middle));
-        let at = [start + SAMPLE_WIDTH + 8.0, middle + MIDDLE * TICK_SIZE];
-        shapes.push(Shape::Words(words(name.into(), at, TICK_SIZE, INK)));
-    }
-    shapes
-}
-
-/// What a series looks like, beside its name.
-pub(super) fn sample(series: &Series, start: f64, middle: f64) -> Vec<Shape> {
-    let end = start + SAMPLE_WIDTH;
+/// What a series looks like in a legend.
+fn sample(series: &Series) -> Vec<Shape> {
     let places = match series.mark {
-        Mark::Line | Mark::Dashes => vec![[start, middle], [end, middle]],
-        Mark::Rings => vec![[f64::midpoint(start, end), middle]],
+        Mark::Line | Mark::Dashes => vec![[0.0, 0.0], [SAMPLE_WIDTH, 0.0]],
+        Mark::Rings => vec![[SAMPLE_WIDTH / 2.0, 0.0]],
     };
     let mut shapes = Vec::new();
     if series.points.iter().any(Point::has_band) {
         let area = Rectangle {
-            left: start,
-            top: middle - 5.0,
-            right: end,
-            bottom: middle + 5.0,
+            left: 0.0,
+            top: -5.0,
+            right: SAMPLE_WIDTH,
+            bottom: 5.0,
         };
         shapes.push(Shape::Polygon {
             points: area.corners().to_vec(),

@@ -11,6 +11,7 @@
 mod battle;
 mod chart;
 mod layout;
+mod legend;
 mod multiples;
 mod png;
 mod scale;
@@ -18,8 +19,8 @@ mod scene;
 mod svg;
 mod text;
 
-pub(crate) use battle::{BattlePicture, Figure, Lens, Link, Side};
-pub(crate) use chart::{Axis, Colour, Corner, LineChart, Mark, Point, Series};
+pub(crate) use battle::{BattlePicture, Figure, Lens, Link, Side, film};
+pub(crate) use chart::{Axis, Colour, LineChart, Mark, Point, Series};
 pub(crate) use multiples::{Multiple, SmallMultiples};
 
 #[cfg(test)]

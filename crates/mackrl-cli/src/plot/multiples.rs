@@ -5,20 +5,19 @@
 use super::{
     chart::{Axis, Series},
     layout::{
-        Axes, FAINT_INK, INK, LABEL_SIZE, MARGIN, MIDDLE, SAMPLE_WIDTH, SUBTITLE_SIZE, TICK_SIZE,
-        TITLE_SIZE, data, grid, label, sample, scale, ticks_below, ticks_beside, titles,
-        widest_label, words,
+        Axes, FAINT_INK, INK, LABEL_SIZE, MARGIN, SUBTITLE_SIZE, TICK_SIZE, data, grid, head,
+        label, rings, scale, ticks_below, ticks_beside, widest_label, words,
     },
     png,
     scene::{Direction, Panel, Rectangle, Scene, Shape, Weight, Words, pixels},
-    svg, text,
+    svg,
 };
 
 const WIDTH: u16 = 960;
 /// Height of the plotting area of one panel.
 const PANEL_HEIGHT: f64 = 150.0;
 /// Between two panels side by side.
-const GAP: f64 = 34.0;
+const GAP: f64 = 42.0;
 /// Above a panel, for its title and note.
 const HEAD: f64 = 44.0;
 
@@ -72,8 +71,11 @@ impl SmallMultiples {
         let heights = points().flat_map(|point| point.band);
         let y = scale(self.y_axis.range, 4.0, heights);
         let left = MARGIN + LABEL_SIZE + 12.0 + widest_label(&y) + 8.0;
-        let top = MARGIN + TITLE_SIZE + 31.0;
-        let across = (f64::from(WIDTH) - MARGIN - 8.0 - left + GAP) / self.columns as f64;
+        let right = f64::from(WIDTH) - MARGIN - 8.0;
+        let named = self.panels.first().map_or(&[][..], |panel| &panel.series);
+        let head = head([&self.title, &self.subtitle], named, [left, right]);
+        let top = head.height;
+        let across = (right - left + GAP) / self.columns as f64;
         let down = HEAD + PANEL_HEIGHT + TICK_SIZE + 14.0;
         let area = |number: usize| {
             let (row, column) = (number / self.columns, number % self.columns);
@@ -100,8 +102,13 @@ impl SmallMultiples {
         let bottom = top + rows as f64 * down;
         let height = bottom + LABEL_SIZE + MARGIN;
         if let Some(first) = panels.first_mut() {
-            let words = self.words(left, [top + HEAD, bottom], height);
-            first.foreground.extend(words);
+            let below = [f64::midpoint(left, right), height - MARGIN + 4.0];
+            let beside = [MARGIN + LABEL_SIZE, f64::midpoint(top + HEAD, bottom)];
+            first.foreground.extend(head.shapes);
+            first.foreground.extend([
+                label(&self.x_axis.label, below, Direction::Rightwards),
+                label(&self.y_axis.label, beside, Direction::Upwards),
+            ]);
         }
         Scene {
             width: WIDTH,
@@ -126,7 +133,8 @@ impl SmallMultiples {
             SUBTITLE_SIZE,
             FAINT_INK,
         );
-        let mut foreground = ticks_below(area, &axes.x);
+        let mut foreground = rings(&panel.series, axes, area);
+        foreground.extend(ticks_below(area, &axes.x));
         if is_first {
             foreground.extend(ticks_beside(area, &axes.y));
         }
@@ -137,26 +145,5 @@ impl SmallMultiples {
             data: data(&panel.series, axes),
             foreground,
         }
-    }
-
-    /// What all panels share: titles, labels of the axes, the legend.
-    fn words(&self, left: f64, [top, bottom]: [f64; 2], height: f64) -> Vec<Shape> {
-        let right = f64::from(WIDTH) - MARGIN - 8.0;
-        let below = [f64::midpoint(left, right), height - MARGIN + 4.0];
-        let beside = [MARGIN + LABEL_SIZE, f64::midpoint(top, bottom)];
-        let mut shapes = Vec::from(titles(&self.title, &self.subtitle, left));
-        shapes.push(label(&self.x_axis.label, below, Direction::Rightwards));
-        shapes.push(label(&self.y_axis.label, beside, Direction::Upwards));
-        let middle = MARGIN + TITLE_SIZE * 0.5;
-        let mut end = right;
-        let series = self.panels.first().map_or(&[][..], |panel| &panel.series);
-        for (series, name) in (series.iter().rev()).filter_map(|s| Some((s, s.name.as_deref()?))) {
-            let start = end - text::width(name, TICK_SIZE, Weight::Regular);
-            let at = [start, middle + MIDDLE * TICK_SIZE];
-            shapes.push(Shape::Words(words(name.to_owned(), at, TICK_SIZE, INK)));
-            shapes.extend(sample(series, start - 8.0 - SAMPLE_WIDTH, middle));
-            end = start - 8.0 - SAMPLE_WIDTH - 18.0;
-        }
-        shapes
     }
 }

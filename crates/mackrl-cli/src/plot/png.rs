@@ -2,14 +2,13 @@
 
 use anyhow::Context as _;
 use tiny_skia::{
-    FillRule, LineCap, LineJoin, Mask, Paint, Path, PathBuilder, Pixmap, Stroke, StrokeDash,
-    Transform,
+    FillRule, LineCap, LineJoin, Mask, Paint, Path, PathBuilder, Pixmap, StrokeDash, Transform,
 };
 use ttf_parser::OutlineBuilder;
 
 use super::{
     chart::Colour,
-    scene::{Anchor, DASHES, Direction, Scene, Shape, Words},
+    scene::{Anchor, Direction, Scene, Shape, Stroke, Words},
     text,
 };
 
@@ -18,16 +17,17 @@ const SCALE: u16 = 2;
 
 /// The encoded image.
 pub(super) fn write(scene: &Scene) -> anyhow::Result<Vec<u8>> {
-    draw(scene)?
+    draw(scene, SCALE)?
         .encode_png()
         .context("encoding the chart as PNG")
 }
 
-fn draw(scene: &Scene) -> anyhow::Result<Pixmap> {
-    let [width, height] = [scene.width, scene.height].map(|size| u32::from(size * SCALE));
+/// The image, with `scale` pixels per unit of the scene.
+pub(super) fn draw(scene: &Scene, scale: u16) -> anyhow::Result<Pixmap> {
+    let [width, height] = [scene.width, scene.height].map(|size| u32::from(size * scale));
     let mut canvas = Canvas {
         pixmap: Pixmap::new(width, height).context("the chart has no area")?,
-        transform: Transform::from_scale(f32::from(SCALE), f32::from(SCALE)),
+        transform: Transform::from_scale(f32::from(scale), f32::from(scale)),
         mask: None,
     };
     canvas.pixmap.fill(tiny_skia::Color::WHITE);
@@ -63,8 +63,8 @@ impl Canvas {
                 points,
                 colour,
                 width,
-                dashed,
-            } => self.stroke(line(points), *colour, *width, *dashed),
+                stroke,
+            } => self.stroke(line(points), *colour, *width, *stroke),
             Shape::Ring {
                 centre: [x, y],
                 radius,
@@ -73,7 +73,7 @@ impl Canvas {
             } => {
                 let circle = PathBuilder::from_circle(single(*x), single(*y), single(*radius));
                 self.fill(circle.clone(), Colour(0xFF, 0xFF, 0xFF), 1.0);
-                self.stroke(circle, *colour, *width, false);
+                self.stroke(circle, *colour, *width, Stroke::Solid);
             }
             Shape::Words(words) => self.fill(outline(words), words.colour, 1.0),
         }
@@ -88,15 +88,14 @@ impl Canvas {
         }
     }
 
-    fn stroke(&mut self, path: Option<Path>, colour: Colour, width: f64, dashed: bool) {
-        let stroke = Stroke {
+    fn stroke(&mut self, path: Option<Path>, colour: Colour, width: f64, stroke: Stroke) {
+        let pattern = stroke.pattern();
+        let stroke = tiny_skia::Stroke {
             width: single(width),
             line_cap: LineCap::Butt,
             line_join: LineJoin::Round,
-            dash: dashed
-                .then(|| StrokeDash::new(DASHES.to_vec(), 0.0))
-                .flatten(),
-            ..Stroke::default()
+            dash: pattern.and_then(|pattern| StrokeDash::new(pattern.to_vec(), 0.0)),
+            ..tiny_skia::Stroke::default()
         };
         if let Some(path) = path {
             let (paint, mask) = (paint(colour, 1.0), self.mask.as_ref());

@@ -22,7 +22,7 @@ pub(super) struct Panel {
     pub(super) background: Vec<Shape>,
     /// Data, clipped to the area.
     pub(super) data: Vec<Shape>,
-    /// Words and the legend, drawn last.
+    /// Words, the legend, and marks that are drawn whole or not at all; drawn last.
     pub(super) foreground: Vec<Shape>,
 }
 
@@ -46,6 +46,21 @@ impl Rectangle {
         } = self;
         [[left, top], [right, top], [right, bottom], [left, bottom]]
     }
+
+    /// Whether the two have some area in common.
+    pub(super) fn overlaps(self, other: Self) -> bool {
+        self.left < other.right
+            && other.left < self.right
+            && self.top < other.bottom
+            && other.top < self.bottom
+    }
+
+    /// Whether a point lies inside or, but for rounding, on the edge.
+    pub(super) fn holds(self, [x, y]: [f64; 2]) -> bool {
+        const HAIR: f64 = 1e-6;
+        (self.left - HAIR..=self.right + HAIR).contains(&x)
+            && (self.top - HAIR..=self.bottom + HAIR).contains(&y)
+    }
 }
 
 /// A thing to draw.
@@ -62,7 +77,7 @@ pub(super) enum Shape {
         points: Vec<[f64; 2]>,
         colour: Colour,
         width: f64,
-        dashed: bool,
+        stroke: Stroke,
     },
     /// A white disc with a coloured edge.
     Ring {
@@ -73,6 +88,21 @@ pub(super) enum Shape {
     },
     /// Words on one line.
     Words(Words),
+}
+
+impl Shape {
+    /// The same `dx` to the right and `dy` down.
+    pub(super) fn moved(mut self, [dx, dy]: [f64; 2]) -> Self {
+        let by = |point: &mut [f64; 2]| *point = [point[0] + dx, point[1] + dy];
+        match &mut self {
+            Self::Polygon { points, .. } | Self::Line { points, .. } => {
+                points.iter_mut().for_each(by);
+            }
+            Self::Ring { centre, .. } => by(centre),
+            Self::Words(words) => by(&mut words.at),
+        }
+        self
+    }
 }
 
 /// Words on one line.
@@ -111,8 +141,24 @@ pub(super) enum Weight {
     Medium,
 }
 
-/// Dash and gap of dashed lines.
-pub(super) const DASHES: [f32; 2] = [5.0, 3.5];
+/// How a line is broken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Stroke {
+    Solid,
+    Dashed,
+    Dotted,
+}
+
+impl Stroke {
+    /// Lengths of what is drawn and of the gap, if there are gaps.
+    pub(super) const fn pattern(self) -> Option<[f32; 2]> {
+        match self {
+            Self::Solid => None,
+            Self::Dashed => Some([5.0, 3.5]),
+            Self::Dotted => Some([2.0, 3.0]),
+        }
+    }
+}
 
 /// An edge of a picture that has room for `length`.
 #[expect(

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::{
     chart::Colour,
-    scene::{Anchor, DASHES, Direction, Scene, Shape, Weight, Words},
+    scene::{Anchor, Direction, Scene, Shape, Weight, Words},
 };
 
 /// The document; `title` is what screen readers say.
@@ -57,14 +57,11 @@ fn element(shape: &Shape) -> String {
             points,
             colour,
             width,
-            dashed,
+            stroke,
         } => {
-            let [dash, gap] = DASHES;
-            let dashes = if *dashed {
+            let dashes = stroke.pattern().map_or_else(String::new, |[dash, gap]| {
                 format!(" stroke-dasharray=\"{dash} {gap}\"")
-            } else {
-                String::new()
-            };
+            });
             format!(
                 "<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{width}\" \
                  stroke-linejoin=\"round\"{dashes}/>\n",

@@ -21,7 +21,6 @@ fn chart(mark: Mark, half_width: f64) -> LineChart {
             mark,
             points: vec![point(0.0, 0.25), point(10.0, 0.5), point(20.0, 3.0)],
         }],
-        legend: Corner::UpperLeft,
     }
 }
 
@@ -113,4 +112,88 @@ fn small_multiples_have_a_panel_each_and_one_legend() {
         "labels stand at the first panel of a row"
     );
     assert!(!multiples.to_png().unwrap().is_empty());
+}
+
+/// What a scene writes, with its place.
+fn words(scene: &scene::Scene) -> Vec<(&str, [f64; 2])> {
+    let shapes = scene.panels.iter().flat_map(|panel| &panel.foreground);
+    let words = shapes.filter_map(|shape| match shape {
+        scene::Shape::Words(words) => Some((&*words.text, words.at)),
+        _ => None,
+    });
+    words.collect()
+}
+
+#[test]
+fn legends_stand_outside_the_data_in_rows_that_fit() {
+    let mut chart = chart(Mark::Line, 0.1);
+    let names: Vec<String> = (0..9)
+        .map(|number| format!("a learner with number {number}"))
+        .collect();
+    chart.series = (names.iter())
+        .map(|name| Series {
+            name: Some(name.clone()),
+            ..chart.series[0].clone()
+        })
+        .collect();
+    let scene = layout::lay_out(&chart);
+    let area = scene.panels[0].area;
+    let mut places: Vec<[f64; 2]> = Vec::new();
+    for (text, at) in words(&scene) {
+        if names.iter().any(|name| name == text) {
+            let end = at[0] + text::width(text, 12.5, scene::Weight::Regular);
+            assert!(at[1] < area.top && end <= area.right, "{text} at {at:?}");
+            places.push(at);
+        }
+    }
+    assert_eq!(places.len(), names.len());
+    let rows: std::collections::BTreeSet<u64> = places.iter().map(|at| at[1].to_bits()).collect();
+    assert!(rows.len() > 1, "nine names need more than one row");
+}
+
+#[test]
+fn published_points_at_the_edge_are_whole() {
+    let mut chart = chart(Mark::Rings, 0.0);
+    chart.x_axis.range = Some([0.0, 20.0]);
+    let points = [
+        [0.0, 0.5],
+        [10.0, 0.5],
+        [20.0, 1.0],
+        [15.0, 3.0],
+        [25.0, 0.5],
+    ];
+    chart.series[0].points = points.map(|[x, y]| Point::exact(x, y)).to_vec();
+    chart.series[0].name = None;
+    let scene = layout::lay_out(&chart);
+    let panel = &scene.panels[0];
+    let is_ring = |shape: &&scene::Shape| matches!(shape, scene::Shape::Ring { .. });
+    assert_eq!(
+        panel.data.iter().filter(is_ring).count(),
+        0,
+        "none is clipped"
+    );
+    let rings: Vec<[f64; 2]> = (panel.foreground.iter())
+        .filter_map(|shape| match shape {
+            scene::Shape::Ring { centre, radius, .. } => {
+                let [x, y] = *centre;
+                let [right, bottom] = [scene.width, scene.height].map(f64::from);
+                assert!(x - radius > 0.0 && x + radius < right, "{x}");
+                assert!(y - radius > 0.0 && y + radius < bottom, "{y}");
+                Some(*centre)
+            }
+            _ => None,
+        })
+        .collect();
+    assert_eq!(
+        rings.len(),
+        3,
+        "those beyond the axes are left out: {rings:?}"
+    );
+    let whole = count(&chart, Colour::BLUE);
+    chart.series[0].points.truncate(1);
+    let one = count(&chart, Colour::BLUE);
+    assert!(
+        whole.abs_diff(3 * one) < one / 3,
+        "{whole} pixels of three, {one} of one"
+    );
 }

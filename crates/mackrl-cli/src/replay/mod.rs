@@ -1,6 +1,8 @@
 //! Looking into replays: how they are opened, told, drawn and shown.
 
+mod caption;
 mod explanation;
+mod film;
 mod picture;
 
 use std::path::Path;
@@ -12,7 +14,8 @@ use mackrl_run::{
 };
 
 use crate::failure::Failure;
-pub(crate) use explanation::Explanation;
+pub(crate) use explanation::{About, Explanation};
+pub(crate) use film::film;
 pub(crate) use picture::picture;
 
 /// A replay that was opened and played again.

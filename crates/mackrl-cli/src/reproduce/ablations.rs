@@ -135,14 +135,17 @@ mod tests {
     use mackrl_run::{config::ConfigBuilder, recorded::TrainingRun};
 
     use super::*;
-    use crate::reproduce::learning::{Body, Report, Variant};
+    use crate::reproduce::{
+        Verdict,
+        learning::{Body, Report, Variant},
+    };
 
-    /// Two runs of each variant: MACKRL ends at 0.8, number n at 0.8 − n/10, all ± 0.05.
+    /// Six runs of each variant: MACKRL ends at 0.8, number n at 0.8 − n/10, all ± 0.05.
     fn example() -> Report {
         let runs: Vec<TrainingRun> = (0..9)
             .flat_map(|number| {
                 let end = 0.8 - f64::from(number) / 10.0;
-                [-0.05, 0.05].map(|noise| {
+                [-0.05, 0.05].repeat(3).into_iter().map(move |noise| {
                     TrainingRun::new(&Config::default(), vec![0.0, 0.3, end + noise], Vec::new())
                 })
             })
@@ -168,18 +171,22 @@ mod tests {
         let versus = third.versus_mackrl.unwrap();
         assert!((versus.difference + 0.3).abs() < 1e-12, "{versus:?}");
         assert_eq!(versus.probability_of_improvement.estimate, 0.0);
-        assert_eq!(report.steps, [0, 1_000, 1_000]);
+        assert_eq!(report.steps, [0, 1_000, 2_000]);
     }
 
     #[test]
     fn a_team_that_always_delegates_is_held_against_central_v() {
         let claim = &example().claims[0];
-        // 0.1 is less than two standard errors of 0.071.
-        assert!(claim.holds, "{claim:?}");
-        assert!(claim.evidence.contains("-0.100 ± 0.071"), "{claim:?}");
-        let gain = &example().claims[1];
+        // The interval reaches from −0.17 to −0.03, which is not within ± 0.15.
+        assert_eq!(claim.verdict, Verdict::DoesNotHold, "{claim:?}");
         assert!(
-            gain.holds && gain.evidence.contains("+0.200 ± 0.071"),
+            claim.evidence.contains("-0.100 [-0.170, -0.030]"),
+            "{claim:?}"
+        );
+        let gain = &example().claims[1];
+        assert_eq!(gain.verdict, Verdict::Holds, "{gain:?}");
+        assert!(
+            gain.evidence.contains("+0.200 [+0.130, +0.270]"),
             "{gain:?}"
         );
     }
@@ -190,14 +197,14 @@ mod tests {
         let svg = report.charts()[0].1.to_svg();
         let text = report.to_string();
         for variant in compared(&report) {
-            let row = format!("{} (2)", variant.arm.label);
+            let row = format!("{} (6)", variant.arm.label);
             assert!(
                 svg.contains(variant.arm.label) && text.contains(&row),
                 "{row}"
             );
         }
         assert_eq!(svg.matches("<clipPath").count(), 8);
-        assert!(svg.contains("−0.30 ± 0.07"), "{svg}");
+        assert!(svg.contains("−0.30 ± 0.03"), "{svg}");
     }
 
     #[test]

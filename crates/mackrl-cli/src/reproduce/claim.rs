@@ -7,17 +7,49 @@ use serde::{Deserialize, Serialize};
 /// Columns of a terminal that evidence is broken to.
 const COLUMNS: usize = 100;
 
-/// A statement and whether it holds.
+/// A statement and the verdict on it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Claim {
     /// The statement.
     pub(crate) claim: String,
     /// Who makes it.
     pub(crate) source: ClaimSource,
-    /// The verdict.
-    pub(crate) holds: bool,
-    /// The rule and the numbers.
+    /// Whether it holds.
+    pub(crate) verdict: Verdict,
+    /// The rule and the numbers, or what is needed to judge.
     pub(crate) evidence: String,
+}
+
+/// What can be said of a claim.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum Verdict {
+    /// The numbers support it.
+    Holds,
+    /// They do not.
+    DoesNotHold,
+    /// There are too few runs, or they are too short, to say.
+    NotTested,
+}
+
+impl Verdict {
+    /// Of a rule that was applied to numbers enough.
+    pub(crate) const fn of(holds: bool) -> Self {
+        if holds {
+            Self::Holds
+        } else {
+            Self::DoesNotHold
+        }
+    }
+
+    /// As it is written in reports.
+    pub(crate) const fn words(self) -> &'static str {
+        match self {
+            Self::Holds => "holds",
+            Self::DoesNotHold => "does not hold",
+            Self::NotTested => "not tested",
+        }
+    }
 }
 
 /// Who makes a claim.
@@ -33,15 +65,15 @@ pub(crate) enum ClaimSource {
 impl Claim {
     /// Writes the verdict, the claim and the evidence, wrapped.
     fn write(&self, out: &mut Formatter<'_>) -> Result {
-        let verdict = if self.holds { "holds" } else { "does not hold" };
-        write_verdict(out, verdict, self.source, [&self.claim, &self.evidence])
+        let texts = [&*self.claim, &*self.evidence];
+        write_verdict(out, self.verdict, self.source, texts)
     }
 }
 
 /// Writes a verdict, a claim and the evidence, wrapped.
 pub(super) fn write_verdict(
     out: &mut Formatter<'_>,
-    verdict: &str,
+    verdict: Verdict,
     source: ClaimSource,
     [claim, evidence]: [&str; 2],
 ) -> Result {
@@ -49,6 +81,7 @@ pub(super) fn write_verdict(
         ClaimSource::Paper => "paper",
         ClaimSource::Reproduction => "ours ",
     };
+    let verdict = verdict.words();
     let mut heading = format!("  {verdict:<13}  {source}  ");
     let indent = " ".repeat(heading.chars().count());
     for line in wrapped(claim, COLUMNS - indent.len()) {

@@ -133,8 +133,9 @@ mod tests {
     use mackrl_run::{config::Config, recorded::TrainingRun};
 
     use super::*;
+    use crate::reproduce::Verdict;
 
-    /// Two runs, of ten tests each, that win `middle` up to two fifths of the training and `end` from there on, give or take 0.01.
+    /// Six runs, of ten tests each, that win `middle` up to two fifths of the training and `end` from there on, give or take 0.01.
     fn runs(middle: f64, end: f64) -> Vec<TrainingRun> {
         let run = |noise: f64| {
             let won: Vec<f64> = (1..=10)
@@ -142,7 +143,7 @@ mod tests {
                 .collect();
             TrainingRun::new(&Config::default(), won, Vec::new())
         };
-        vec![run(-0.01), run(0.01)]
+        [-0.01, 0.01].repeat(3).into_iter().map(run).collect()
     }
 
     /// Which of the three aims hold.
@@ -153,7 +154,32 @@ mod tests {
             .collect();
         let claims = FIGURE.report(None, &all).claims;
         assert_eq!(claims.len(), 8);
-        [5, 6, 7].map(|aim| claims[aim].holds)
+        [5, 6, 7].map(|aim| claims[aim].verdict == Verdict::Holds)
+    }
+
+    #[test]
+    fn two_seeds_or_short_runs_judge_nothing() {
+        let groups = |seeds: usize| -> Vec<TrainingRun> {
+            let cells = [[0.7, 0.99], [0.1, 0.2], [0.7, 0.99], [0.1, 0.2]];
+            let runs = cells.map(|[middle, end]| runs(middle, end));
+            runs.into_iter()
+                .flat_map(|runs| runs[..seeds].to_vec())
+                .collect()
+        };
+        for claim in FIGURE.report(None, &groups(2)).claims {
+            assert_eq!(claim.verdict, Verdict::NotTested, "{}", claim.claim);
+            assert!(
+                claim.evidence.starts_with("Needs 5 seeds"),
+                "{}",
+                claim.evidence
+            );
+        }
+        let claims = FIGURE.report(None, &groups(5)).claims;
+        assert!(
+            claims
+                .iter()
+                .all(|claim| claim.verdict != Verdict::NotTested)
+        );
     }
 
     #[test]

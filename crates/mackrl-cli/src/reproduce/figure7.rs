@@ -47,6 +47,8 @@ pub(crate) static FIGURE: Figure = Figure {
     claims: &[
         Statement {
             claim: "At the beginning of training, the pair controller delegates only rarely",
+            // The first batch is that of an untrained team, however long the run.
+            needs: (5, 1_000),
             rule: Rule::Delegates {
                 moment: 0,
                 enemies: &[0, 1, 2, 3, 4, 5],
@@ -74,3 +76,35 @@ pub(crate) static FIGURE: Figure = Figure {
         },
     ],
 };
+
+#[cfg(test)]
+mod tests {
+    use mackrl_run::{config::Config, recorded::TrainingRun};
+
+    use super::*;
+    use crate::reproduce::Chart;
+
+    #[test]
+    fn every_moment_has_a_panel_of_its_own_with_the_published_curve() {
+        let rates = vec![vec![Some(0.5); 6]; 2];
+        let run = || TrainingRun::new(&Config::default(), vec![0.0, 0.5], rates.clone());
+        let charts = FIGURE.report(None, &[run(), run()]).charts();
+        let [(_, Chart::Multiples(chart))] = &charts[..] else {
+            panic!("one chart of several panels, found {}", charts.len());
+        };
+        let Curves::Moments(published) = FIGURE.curves else {
+            panic!("moments");
+        };
+        assert_eq!(chart.panels.len(), published.len());
+        for (panel, (_, rates)) in chart.panels.iter().zip(published) {
+            let named = panel.series.iter().filter(|series| series.name.is_some());
+            let named: Vec<_> = named.collect();
+            assert_eq!(named[1].name.as_deref(), Some("published 2018"));
+            let heights: Vec<f64> = named[1].points.iter().map(|point| point.y).collect();
+            assert_eq!(heights, rates);
+        }
+        let notes: std::collections::BTreeSet<&str> =
+            chart.panels.iter().map(|panel| &*panel.note).collect();
+        assert_eq!(notes.len(), published.len(), "{notes:?}");
+    }
+}

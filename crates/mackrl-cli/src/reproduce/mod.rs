@@ -4,7 +4,10 @@
 
 pub(crate) mod ablations;
 pub(crate) mod all;
+pub(crate) mod calibration;
 mod claim;
+pub(crate) mod comparison;
+pub(crate) mod figure4_neurips;
 pub(crate) mod figure5;
 pub(crate) mod figure6;
 pub(crate) mod figure7;
@@ -22,7 +25,7 @@ use mackrl_run::run_folder;
 use serde::Serialize;
 
 use crate::plot::{LineChart, SmallMultiples};
-pub(crate) use claim::{Claim, ClaimSource, write_verdicts};
+pub(crate) use claim::{Claim, ClaimSource, Verdict, write_verdicts};
 
 /// A drawing.
 pub(crate) enum Chart {

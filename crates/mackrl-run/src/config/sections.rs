@@ -67,6 +67,12 @@ declare_settings! {
         tensorboard: bool = false, Accepts::Flag;
         /// Seed from which every random draw of the run is derived; known to all agents.
         seed: u64 = 1, Accepts::integer(0, EXACT);
+        /// SHA-256 of the weights that the team begins with, which `mackrl train --from` takes from another run. Without it, the team has learnt nothing.
+        #[serde(skip_serializing_if = "String::is_empty")]
+        initial_weights: String = String::new(), Accepts::Text {
+            expects: "the SHA-256 of a file of weights",
+            pattern: Some("^([0-9a-f]{64})?$"),
+        };
     }
 }
 
@@ -173,6 +179,8 @@ impl Config {
             ("algorithm", "name") => Some(self.algorithm.name().into()),
             ("env", name) => self.env.get(name).cloned(),
             ("algorithm", name) => self.algorithm.get(name).cloned(),
+            // A file has it only where it says something.
+            ("run", "initial_weights") => Some(self.run.initial_weights.as_str().into()),
             ("test", name) => toml::Table::try_from(&self.test).ok()?.get(name).cloned(),
             ("run", name) => toml::Table::try_from(&self.run).ok()?.get(name).cloned(),
             _ => None,

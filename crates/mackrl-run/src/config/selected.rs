@@ -5,7 +5,7 @@ use std::{fmt::Debug, sync::Arc};
 use mackrl::algorithms::AlgorithmKind;
 use mackrl_env::{
     WorldKind,
-    settings::{Accepts, Setting},
+    settings::{Accepts, EXACT, Setting},
 };
 use serde::{Serialize, Serializer, ser::SerializeMap};
 
@@ -168,11 +168,20 @@ impl<K: Kind + ?Sized> Serialize for Selected<K> {
     }
 }
 
-/// `value`, but for an integer as a number where numbers are taken: so people write them.
+/// `value`, but for an integer as a number where numbers are taken, and 1e6 as an integer where integers are: so people write them.
 pub(super) fn as_asked(accepts: Accepts, value: toml::Value) -> toml::Value {
     match (accepts, value) {
         (Accepts::Number { .. }, toml::Value::Integer(integer)) => {
             toml::Value::Float(integer as f64)
+        }
+        (Accepts::Integer { .. }, toml::Value::Float(number))
+            if number.fract() == 0.0 && number.abs() < EXACT as f64 =>
+        {
+            #[expect(
+                clippy::cast_possible_truncation,
+                reason = "it has no fraction and fits"
+            )]
+            toml::Value::Integer(number as i64)
         }
         (_, value) => value,
     }

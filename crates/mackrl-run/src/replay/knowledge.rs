@@ -1,6 +1,9 @@
 //! Who knows what in a group, and why it is or is not common.
 
-use mackrl::common_knowledge::common_knowledge;
+use mackrl::{
+    common_knowledge::common_knowledge,
+    policy::{PartitionThought, Thought},
+};
 use mackrl_env::{AgentId, EntitySet};
 
 /// What the members of a group know at one moment, in parts that do not overlap.
@@ -61,4 +64,14 @@ impl GroupKnowledge {
                 .collect(),
         }
     }
+}
+
+/// The groups of a partition without the dead, who have no controllers in `thought`. Two partitions may differ in the dead alone.
+#[must_use]
+pub fn living_groups(thought: &Thought, partition: &PartitionThought) -> Vec<Vec<AgentId>> {
+    let is_alive = |agent: &AgentId| thought.agents.iter().any(|alone| alone.agent == *agent);
+    let living =
+        |group: &Vec<AgentId>| -> Vec<AgentId> { group.iter().copied().filter(is_alive).collect() };
+    let groups = partition.groups.iter().map(living);
+    groups.filter(|group| !group.is_empty()).collect()
 }

@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 pub use self::{
-    knowledge::{GroupKnowledge, PrivateKnowledge},
+    knowledge::{GroupKnowledge, PrivateKnowledge, living_groups},
     names::Names,
     page::page,
     playback::{Moment, Playback},

@@ -12,6 +12,8 @@ pub struct Names {
     agents: usize,
     /// Name of the type of every unit.
     kinds: Vec<String>,
+    /// What stands for the type of every unit.
+    letters: Vec<String>,
     heals: Vec<bool>,
 }
 
@@ -23,12 +25,14 @@ impl Names {
         let profiles = &scenario.field.profiles;
         let profile = |kind: u8| &profiles[usize::from(kind)];
         let recruits = scenario.recruits.iter();
+        let kinds: Vec<String> = recruits
+            .clone()
+            .map(|recruit| printable(&profile(recruit.kind).name))
+            .collect();
         Self {
             agents: skirmish.spec().agents,
-            kinds: recruits
-                .clone()
-                .map(|recruit| printable(&profile(recruit.kind).name))
-                .collect(),
+            letters: kinds.iter().map(|kind| letters(kind, &kinds)).collect(),
+            kinds,
             heals: recruits
                 .map(|recruit| profile(recruit.kind).care.is_some())
                 .collect(),
@@ -62,6 +66,12 @@ impl Names {
         self.kinds.get(entity.index()).map_or("", String::as_str)
     }
 
+    /// One or two letters that stand for the entity's type in this battle: M, or Me and Mn where several types begin with M.
+    #[must_use]
+    pub fn letters(&self, entity: EntityId) -> &str {
+        self.letters.get(entity.index()).map_or("", String::as_str)
+    }
+
     /// What `agent` does by `action`.
     #[must_use]
     pub fn action(&self, agent: AgentId, action: Action) -> String {
@@ -79,4 +89,42 @@ impl Names {
 /// A name that somebody wrote, without what would change a terminal or break a document.
 fn printable(name: &str) -> String {
     name.chars().filter(|c| !c.is_control()).collect()
+}
+
+/// The first letter of `kind` and, if other kinds have the same, the first later one that none of these has in its place.
+fn letters(kind: &str, kinds: &[String]) -> String {
+    let mut own = kind.chars();
+    let first: String = own
+        .next()
+        .into_iter()
+        .flat_map(char::to_uppercase)
+        .collect();
+    let begins = |other: &&String| {
+        *other != kind && other.to_uppercase().starts_with(&first) && !first.is_empty()
+    };
+    let rivals: Vec<&String> = kinds.iter().filter(begins).collect();
+    if rivals.is_empty() {
+        return first;
+    }
+    let second = own.enumerate().find(|(place, letter)| {
+        let is_shared = |rival: &&String| rival.chars().nth(place + 1) == Some(*letter);
+        !rivals.iter().any(is_shared)
+    });
+    first + &second.map_or_else(String::new, |(_, letter)| letter.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn types_that_begin_alike_have_two_letters() {
+        let all = |kinds: &[&str]| -> Vec<String> {
+            let kinds: Vec<String> = kinds.iter().map(|&kind| kind.to_owned()).collect();
+            kinds.iter().map(|kind| letters(kind, &kinds)).collect()
+        };
+        assert_eq!(all(&["stalker", "zealot", "stalker"]), ["S", "Z", "S"]);
+        assert_eq!(all(&["marine", "marauder", "medivac"]), ["Mn", "Ma", "Me"]);
+        assert_eq!(all(&["", "ä"]), ["", "Ä"]);
+    }
 }

@@ -25,7 +25,7 @@ use super::{
     kept::Kept,
     manifest::{FORMAT, Fingerprint, Growing, Manifest},
     memory::{self, MEMORY},
-    stored::ConfigFile,
+    stored::{ConfigFile, Plan},
     untrusted,
 };
 use crate::{
@@ -205,7 +205,8 @@ pub(super) fn latest(
     let mut wrong = Vec::new();
     for number in numbers(run)?.into_iter().rev() {
         match read(run, config, number, (wanted, tensors_max)) {
-            Ok(stored) => return Ok((Some(stored), wrong)),
+            Ok(Some(stored)) => return Ok((Some(stored), wrong)),
+            Ok(None) => {}
             Err(error) => wrong.push(format!(
                 "{} is damaged: {}",
                 run.shown(place(number)).display(),
@@ -243,25 +244,37 @@ pub(super) fn weights_path(number: u64) -> PathBuf {
     place(number).join(TENSORS)
 }
 
-/// Reads a checkpoint, and compares everything with its manifest. The configuration decides what a checkpoint means; the metrics
+/// Reads a checkpoint, and compares everything with its manifest; nothing, if it is one from the end of a run that was extended
+/// since. The configuration decides what a checkpoint means; the metrics
 /// only stand beside it, so damage to them costs no checkpoint.
-fn read(run: &Folder, config: &ConfigFile, number: u64, wanted: (Wanted, usize)) -> Result<Stored> {
+fn read(
+    run: &Folder,
+    config: &ConfigFile,
+    number: u64,
+    wanted: (Wanted, usize),
+) -> Result<Option<Stored>> {
     let place = place(number);
     let manifest = read_manifest(run, &place)?;
-    if !config.is(&manifest.config) {
+    let Some(plan) = config.plan(&manifest.config) else {
         return Err(differs(run, Path::new(CONFIG)));
+    };
+    let checkpoint = read_files(run, &place, &manifest, wanted)?;
+    if let Plan::Former(steps_env) = plan
+        && !checkpoint.is_before_end(steps_env)?
+    {
+        return Ok(None);
     }
     let metrics = match run.file(METRICS)? {
         Some(file) => (manifest.metrics.begins(file))
             .with_context(|| run.cannot("read", Path::new(METRICS)))?,
         None => manifest.metrics.begins(&b""[..]).unwrap_or_default(),
     };
-    Ok(Stored {
+    Ok(Some(Stored {
         number,
-        checkpoint: read_files(run, &place, &manifest, wanted)?,
+        checkpoint,
         metrics,
         weights: manifest.weights,
-    })
+    }))
 }
 
 /// Reads the checkpoint in a folder whose run is not known.

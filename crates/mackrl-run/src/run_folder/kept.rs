@@ -25,6 +25,7 @@ use super::{
 use crate::{
     error::{Context, Result, RunError},
     folder::Folder,
+    number,
 };
 
 /// Digits of a number of steps in the name of a file: names sort as numbers do.
@@ -64,8 +65,9 @@ impl FromStr for WhichWeights {
         match text {
             LAST => Ok(Self::Last),
             BEST => Ok(Self::Best),
-            number => (number.parse().map(Self::Step))
-                .map_err(|_| format!("`{text}`, expected {LAST}, {BEST} or a number of steps")),
+            number => number::whole(number)
+                .map(Self::Step)
+                .ok_or_else(|| format!("`{text}`, expected {LAST}, {BEST} or a number of steps")),
         }
     }
 }

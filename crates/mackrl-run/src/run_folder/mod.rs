@@ -7,6 +7,7 @@
 //! DIR/metrics.jsonl         one JSON object a line
 //! DIR/checkpoints/          the latest few, from which the run continues
 //! DIR/weights.safetensors   the policy and the critic; written at the end
+//! DIR/initial.safetensors   the weights of another run that this one began with, if it did
 //! DIR/weights/              those that did best in a test, and those of every so many steps, if `run.weights_interval_steps_env` is set
 //! DIR/events.out.tfevents.* the metrics for TensorBoard, if `run.tensorboard` is set; one file for each process that trained
 //! DIR/replays/              episodes that `mackrl evaluate --save-replays` kept
@@ -27,6 +28,7 @@ mod claim;
 mod description;
 mod disk;
 mod event_file;
+mod extension;
 mod kept;
 mod latest;
 mod manifest;
@@ -55,6 +57,8 @@ pub use description::{
 };
 use disk::{Disk, RealDisk, cannot_write};
 use event_file::EventFile;
+use extension::forget_former_end;
+pub use extension::{Extension, InitialSource, InitialWeights, extend};
 use kept::Kept;
 pub use kept::WhichWeights;
 pub use latest::{LatestRow, latest_row};
@@ -62,7 +66,7 @@ use mackrl::nn::InstructionSet;
 use manifest::{Fingerprint, Growing};
 pub use mirror::Mirror;
 pub use record::Status;
-use record::{RunRecord, build, read_record};
+use record::{RunRecord, build, command_line, read_record};
 pub use recorded::{Recorded, timeless};
 pub use rows::{Following, Row, follow_rows, read_rows};
 pub use stored::Run;
@@ -82,6 +86,8 @@ const CONFIG: &str = "config.toml";
 pub const METRICS: &str = "metrics.jsonl";
 const RUN: &str = "run.json";
 const WEIGHTS: &str = "weights.safetensors";
+/// Weights of another run that this one began with.
+const INITIAL: &str = "initial.safetensors";
 /// Folder of the weights that are kept beside the last.
 const KEPT: &str = "weights";
 const LOCK: &str = "lock";
@@ -114,6 +120,8 @@ pub struct Resumption {
     pub config: Config,
     /// Where it goes on; a run that was interrupted before its first checkpoint begins again.
     pub checkpoint: Option<Checkpoint>,
+    /// The weights of another run that it begins with, if it does and begins again.
+    pub initial: Option<Vec<u8>>,
     /// Later checkpoints that could not be used, and why.
     pub damaged: Vec<String>,
     /// Where metrics were put that are not those of the checkpoint.
@@ -144,22 +152,43 @@ impl RunFolder {
     /// [`RunError::FolderInUse`] or [`RunError::UnfinishedRun`] if something lies there already, [`RunError::FolderLocked`] if
     /// another process writes there; otherwise the path that could not be written.
     pub fn create(path: &Path, config: &Config, threads: usize) -> Result<Self> {
+        Self::create_from(path, config, None, threads)
+    }
+
+    /// As [`RunFolder::create`], of a run that begins with the weights of another, of which `config` has the hash.
+    ///
+    /// # Errors
+    /// As [`RunFolder::create`].
+    pub fn create_from(
+        path: &Path,
+        config: &Config,
+        initial: Option<&InitialWeights>,
+        threads: usize,
+    ) -> Result<Self> {
         Self::check_free(path)?;
         fs::create_dir_all(path).with_context(|| format!("cannot create {}", path.display()))?;
         let folder = Folder::open(path)?;
         let claim = Claim::acquire(&folder, None)?;
         // Another process may have been quicker, and be done already.
         expect_free(&folder)?;
+        if let Some(initial) = initial {
+            disk::replace(&RealDisk, &folder, Path::new(INITIAL), &initial.bytes)?;
+        }
         let text = config.to_toml();
         disk::replace(&RealDisk, &folder, Path::new(CONFIG), text.as_bytes())?;
         let fingerprint = Fingerprint::of(text.as_bytes());
-        Self::open(
+        let mut opened = Self::open(
             folder,
             (config, fingerprint),
             threads,
             claim,
             Growing::default(),
-        )
+        )?;
+        if let Some(initial) = initial {
+            opened.record.initial_weights = Some(initial.source.clone());
+            opened.set_status(Status::Running)?;
+        }
+        Ok(opened)
     }
 
     /// Creates the folder of a new run for another process to make: with its configuration, and nothing else.
@@ -208,6 +237,11 @@ impl RunFolder {
             best,
             tensors_max,
         )?;
+        forget_former_end(&folder, read_record(&folder).as_ref())?;
+        let is_first = latest.is_none() && !config.config.run.initial_weights.is_empty();
+        let initial = is_first
+            .then(|| folder.read_needed(Path::new(INITIAL), tensors_max))
+            .transpose()?;
         let fingerprint = config.fingerprint();
         let config = config.config;
         let (metrics, checkpoint) = latest
@@ -230,6 +264,7 @@ impl RunFolder {
             folder: opened,
             config,
             checkpoint,
+            initial,
             damaged,
             earlier,
         })
@@ -245,9 +280,9 @@ impl RunFolder {
     ) -> Result<Self> {
         let metrics = metrics_file::open(&folder, metrics_so_far.bytes())?;
         let mut record = read_record(&folder).unwrap_or_else(|| RunRecord {
-            command: std::env::args_os()
-                .map(|word| word.to_string_lossy().into_owned())
-                .collect(),
+            command: command_line(),
+            initial_weights: None,
+            former_plans: Vec::new(),
             provenance: Vec::new(),
             threads,
             simd: None,
@@ -259,6 +294,9 @@ impl RunFolder {
             files: Default::default(),
         });
         record.threads = threads;
+        record
+            .former_plans
+            .retain(|plan| plan.config != fingerprint);
         record.build = Some(build());
         record.simd = InstructionSet::chosen()
             .ok()
@@ -428,7 +466,12 @@ impl RunFolder {
 /// Refuses a folder that cannot become a run folder.
 fn expect_free(there: &Folder) -> Result<()> {
     // What stands in the folder of a run that was killed before it had a configuration.
-    let unborn = [PathBuf::from(LOCK), disk::temporary(Path::new(CONFIG))];
+    let unborn = [
+        PathBuf::from(LOCK),
+        PathBuf::from(INITIAL),
+        disk::temporary(Path::new(INITIAL)),
+        disk::temporary(Path::new(CONFIG)),
+    ];
     let entries = there.entries("")?;
     let is_unborn = |name: &str| unborn.iter().any(|own| own == Path::new(name));
     if entries.iter().all(|(name, _)| is_unborn(name)) {

@@ -4,7 +4,12 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::{RUN, manifest::Fingerprint, untrusted};
+use super::{
+    RUN,
+    extension::{FormerPlan, InitialSource},
+    manifest::Fingerprint,
+    untrusted,
+};
 use crate::{folder::Folder, provenance::Provenance, training::Teams};
 
 /// How far a run has come.
@@ -26,6 +31,12 @@ pub enum Status {
 pub(super) struct RunRecord {
     /// The command line, word by word.
     pub(super) command: Vec<String>,
+    /// Where the weights come from that the run began with, if it did not begin untrained.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) initial_weights: Option<InitialSource>,
+    /// Lengths that were planned before the run was extended, in their order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) former_plans: Vec<FormerPlan>,
     /// Where the run's results come from: one entry, or one for each version of this program that went on with it, in their
     /// order.
     #[serde(default)]
@@ -57,6 +68,14 @@ pub(super) struct RunRecord {
 pub(super) fn read_record(folder: &Folder) -> Option<RunRecord> {
     let json = folder.read(RUN, untrusted::TEXT_MAX).ok()??;
     serde_json::from_slice(&json).ok()
+}
+
+/// The command line of this process, word by word.
+pub(super) fn command_line() -> Vec<String> {
+    let words = std::env::args_os();
+    words
+        .map(|word| word.to_string_lossy().into_owned())
+        .collect()
 }
 
 /// How this program was built.

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::{
     CONFIG, METRICS, RUN, WEIGHTS, checkpoints,
+    extension::FormerPlan,
     kept::{self, WhichWeights},
     manifest::Fingerprint,
     record::{RunRecord, Status, read_record},
@@ -29,11 +30,13 @@ pub(crate) struct StoredRun {
 }
 
 /// The configuration of a run as its file holds it.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct ConfigFile {
     /// What the file says.
     pub(crate) config: Config,
     text: String,
+    /// What was planned before the run was extended.
+    pub(super) former: Vec<FormerPlan>,
 }
 
 /// Whether what is left of a run is what it ended with.
@@ -45,6 +48,15 @@ pub(crate) enum Completeness {
     Finished,
     /// It has, and its weights were changed or lost since; its last checkpoint gives them again.
     WithoutWeights,
+}
+
+/// How long a run was planned when something was written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Plan {
+    /// As it is now.
+    Present,
+    /// For fewer environment steps, these.
+    Former(u64),
 }
 
 impl ConfigFile {
@@ -60,7 +72,20 @@ impl ConfigFile {
             .build()?;
         // Tools for versions of files may end lines otherwise.
         let text = text.replace("\r\n", "\n");
-        Ok(Self { config, text })
+        Ok(Self {
+            config,
+            text,
+            former: Vec::new(),
+        })
+    }
+
+    /// Under which plan of this run something was written with this fingerprint; nothing, if it is of another configuration.
+    pub(super) fn plan(&self, fingerprint: &Fingerprint) -> Option<Plan> {
+        let mut former = self.former.iter();
+        match former.find(|plan| plan.config == *fingerprint) {
+            Some(plan) => Some(Plan::Former(plan.steps_env)),
+            None => self.is(fingerprint).then_some(Plan::Present),
+        }
     }
 
     /// Of the file as it is.
@@ -90,9 +115,18 @@ impl StoredRun {
     /// As [`Self::open`].
     pub(super) fn within(folder: Folder) -> Result<Self> {
         untrusted::check(&folder)?;
+        let mut config = ConfigFile::read(&folder)?;
+        let record = read_record(&folder);
+        if let Some(record) = &record {
+            // If the program was stopped in between, the new plan was not written.
+            let own = config.fingerprint();
+            let former = record.former_plans.iter();
+            let former = former.filter(|plan| plan.config != own);
+            config.former.extend(former.cloned());
+        }
         let run = Self {
-            config: ConfigFile::read(&folder)?,
-            record: read_record(&folder),
+            config,
+            record,
             folder,
         };
         match run.seal(CONFIG) {

@@ -6,7 +6,7 @@
 
 use std::path::Path;
 
-use super::{CHECKPOINTS, CONFIG, KEPT, LOCK, METRICS, REPLAYS, RUN, WEIGHTS};
+use super::{CHECKPOINTS, CONFIG, INITIAL, KEPT, LOCK, METRICS, REPLAYS, RUN, WEIGHTS};
 use crate::{
     error::Result,
     folder::{Folder, Kind},
@@ -23,7 +23,7 @@ pub(super) fn check(run: &Folder) -> Result<()> {
     for (name, kind) in run.entries("")? {
         let own = name.strip_suffix(".tmp").unwrap_or(&name);
         match own {
-            CONFIG | METRICS | RUN | WEIGHTS | LOCK => {
+            CONFIG | METRICS | RUN | WEIGHTS | INITIAL | LOCK => {
                 run.expect(Path::new(&name), kind, Kind::File)?;
             }
             CHECKPOINTS | KEPT | REPLAYS => run.expect(Path::new(&name), kind, Kind::Folder)?,

@@ -122,11 +122,34 @@ pub fn evaluate_in(
     episodes: Episodes,
     threads: usize,
 ) -> Result<Evaluation, Error> {
+    evaluate_each(world, config, weights, episodes, threads, &mut |_| ())
+}
+
+/// As [`evaluate_in`]; gives `each` what was measured of every episode, in the order of their numbers.
+///
+/// # Errors
+/// As [`evaluate_in`].
+pub fn evaluate_each(
+    world: &assembly::RunWorld,
+    config: &Config,
+    weights: &[u8],
+    episodes: Episodes,
+    threads: usize,
+    each: &mut dyn FnMut(&EpisodeResult<'_>),
+) -> Result<Evaluation, Error> {
     let algorithm = assembly::trained(config, world, weights)?;
     let mut evaluator = Evaluator::new(algorithm.policy(), world, episodes.count, threads);
-    evaluator.play(algorithm.parameters(), episodes.count, |episode| {
-        EpisodeKey::new(episodes.seed, Stream::Evaluation, episode)
-    })
+    let key = |episode| EpisodeKey::new(episodes.seed, Stream::Evaluation, episode);
+    evaluator.play_each(algorithm.parameters(), episodes.count, key, each)
+}
+
+/// What was measured of one episode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EpisodeResult<'a> {
+    /// Its number, from 0.
+    pub episode: u64,
+    /// Names and values, as [`Evaluation::quantities`] has their means.
+    pub values: Vec<(&'a str, f64)>,
 }
 
 /// Environments in which greedy episodes are played.
@@ -170,6 +193,17 @@ impl Evaluator {
         episodes: usize,
         key: impl Fn(u64) -> EpisodeKey,
     ) -> Result<Evaluation, Error> {
+        self.play_each(parameters, episodes, key, &mut |_| ())
+    }
+
+    /// As [`Self::play`]; gives `each` what was measured of every episode.
+    fn play_each(
+        &mut self,
+        parameters: &Parameters,
+        episodes: usize,
+        key: impl Fn(u64) -> EpisodeKey,
+        each: &mut dyn FnMut(&EpisodeResult<'_>),
+    ) -> Result<Evaluation, Error> {
         let settings = PlaySettings {
             behaviour: Behaviour::GREEDY,
             recording: Recording::Off,
@@ -178,7 +212,7 @@ impl Evaluator {
         let mut tally = Tally::default();
         let mut keys = Vec::with_capacity(self.collector.environments());
         let mut openings = BTreeSet::new();
-        let mut next = 0;
+        let (mut next, mut played) = (0, 0);
         while next < episodes as u64 {
             let end = (next + self.collector.environments() as u64).min(episodes as u64);
             keys.clear();
@@ -188,6 +222,8 @@ impl Evaluator {
             tally.merge(&self.collector.tally());
             let pieces = self.collector.pieces();
             for episode in pieces.flat_map(|piece| &piece.experience.episodes) {
+                each(&self.samples.of_episode(played, episode));
+                played += 1;
                 self.samples.add(episode);
                 openings.insert(opening(episode));
             }
@@ -217,6 +253,16 @@ enum Measure {
     Length,
     /// The statistic at this index of those that the world declares.
     Statistic(usize),
+}
+
+impl Measure {
+    fn of(self, episode: &Episode) -> f64 {
+        match self {
+            Self::Return => episode.total_reward(),
+            Self::Length => episode.steps() as f64,
+            Self::Statistic(index) => episode.statistics_s[index],
+        }
+    }
 }
 
 /// What was measured in every episode, by names and in the order of [`Evaluation::quantities`]. Its size does not depend on how
@@ -302,11 +348,16 @@ impl Samples {
 
     fn add(&mut self, episode: &Episode) {
         for (_, measure, sample) in &mut self.measured {
-            sample.add(match *measure {
-                Measure::Return => episode.total_reward(),
-                Measure::Length => episode.steps() as f64,
-                Measure::Statistic(index) => episode.statistics_s[index],
-            });
+            sample.add(measure.of(episode));
+        }
+    }
+
+    fn of_episode(&self, number: u64, episode: &Episode) -> EpisodeResult<'_> {
+        let values = self.measured.iter();
+        let values = values.map(|(name, measure, _)| (name.as_str(), measure.of(episode)));
+        EpisodeResult {
+            episode: number,
+            values: values.collect(),
         }
     }
 

@@ -19,7 +19,9 @@ mod weights;
 pub use checkpoint::Checkpoint;
 pub use comparison::{Difference, compare_tensors};
 pub use description::trained_steps_env;
-pub use evaluation::{Episodes, Evaluation, Quantity, evaluate, evaluate_in};
+pub use evaluation::{
+    EpisodeResult, Episodes, Evaluation, Quantity, evaluate, evaluate_each, evaluate_in,
+};
 pub use metrics::{METRICS, MetricRow, explained, headline, is_explained, of_statistics};
 pub use teams::{Score, Teams};
 pub use trainer::Trainer;

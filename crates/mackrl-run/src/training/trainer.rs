@@ -22,7 +22,7 @@ use super::{
     teams::{Best, episodes_of_judgement},
     write_weights,
 };
-use crate::config::Config;
+use crate::{config::Config, provenance::sha256};
 
 /// Trains one team.
 pub struct Trainer {
@@ -60,7 +60,35 @@ impl Trainer {
         world: &assembly::RunWorld,
         threads: usize,
     ) -> Result<Self, Error> {
+        if !config.run.initial_weights.is_empty() {
+            return Err(Error::Config(format!(
+                "the run begins with the weights of SHA-256 {}, which are not given: `mackrl train --from` gives them",
+                config.run.initial_weights
+            )));
+        }
         let algorithm = assembly::algorithm(config, world, threads)?;
+        Self::of(algorithm, config, world, threads)
+    }
+
+    /// As [`Trainer::in_world`], of a team that begins with `weights`, a safetensors file of which the configuration has the hash.
+    ///
+    /// # Errors
+    /// As [`Trainer::in_world`], and [`Error::Data`] if the weights are others, or those of another kind of team.
+    pub fn beginning_with(
+        weights: &[u8],
+        config: &Config,
+        world: &assembly::RunWorld,
+        threads: usize,
+    ) -> Result<Self, Error> {
+        let (expected, found) = (&config.run.initial_weights, sha256(weights));
+        if found != *expected {
+            return Err(Error::Data(format!(
+                "the run began with weights of SHA-256 {expected}, these have {found}"
+            )));
+        }
+        assembly::expect_room(config, world, weights)?;
+        let mut algorithm = assembly::algorithm(config, world, threads)?;
+        algorithm.load(&StoredWeights(weights))?;
         Self::of(algorithm, config, world, threads)
     }
 
@@ -132,7 +160,7 @@ impl Trainer {
     /// Whether the configured number of steps has been played and the last test is done.
     #[must_use]
     pub const fn finished(&self) -> bool {
-        self.steps_env >= self.config.run.steps_env && self.next_test > self.steps_env
+        self.steps_env >= self.config.run.steps_env && !self.is_test_due()
     }
 
     /// Plays and learns from one batch of episodes, or plays a test if one is due: before the first batch, at every interval,
@@ -147,6 +175,10 @@ impl Trainer {
     pub fn update(&mut self) -> Result<Option<MetricRow>, Error> {
         if self.is_test_due() {
             return self.test().map(Some);
+        }
+        if let Some(row) = self.row_of_batch() {
+            // The run ended here until it was made longer.
+            return Ok(Some(row));
         }
         self.play()?;
         self.learn_from_batch()?;
@@ -300,9 +332,12 @@ impl Trainer {
         Ok(())
     }
 
-    /// Whether the next iteration is a test.
+    /// Whether the next iteration is a test: because so many steps have been played, or because the run ends here, and has
+    /// given no row here yet. How long the run is planned is no part of its state, so that it can be made longer.
     pub(super) const fn is_test_due(&self) -> bool {
-        self.steps_env >= self.next_test
+        let ends_here =
+            self.steps_env >= self.config.run.steps_env && self.interval.steps_env < self.steps_env;
+        self.steps_env >= self.next_test || ends_here
     }
 
     /// What a number that is not finite is dated with.
@@ -356,9 +391,6 @@ impl Trainer {
 
     /// The row that is due after a batch, if one is; a test, which is due after the last batch, gives its own.
     pub(super) fn row_of_batch(&mut self) -> Option<MetricRow> {
-        if self.steps_env >= self.config.run.steps_env {
-            self.next_test = self.steps_env;
-        }
         let is_due = self.steps_env >= self.next_row && !self.is_test_due();
         is_due.then(|| self.row())
     }

@@ -16,7 +16,8 @@ use crate::{
     error::{Result, RunError},
     provenance::{Provenance, Versions},
     run_folder::{
-        Completeness, Resumption, RunFolder, Status, StoredRun, WhichWeights, latest_row,
+        Completeness, InitialWeights, Resumption, RunFolder, Status, StoredRun, WhichWeights,
+        latest_row,
     },
     stop_request::StopRequest,
     training::{Checkpoint, MetricRow, Score, Teams, Trainer, assembly::RunWorld, headline},
@@ -89,22 +90,40 @@ pub fn train(
     stop: &StopRequest,
     observer: &mut dyn Observer,
 ) -> Result<Summary> {
+    train_from(path, config, None, world, threads, stop, observer)
+}
+
+/// As [`train`]; with `initial`, of a team that begins with the weights of another run, of which `config` has the hash.
+///
+/// # Errors
+/// As [`train`], and [`mackrl::Error::Data`] if the weights are not those of such a team.
+pub fn train_from(
+    path: &Path,
+    config: &Config,
+    initial: Option<&InitialWeights>,
+    world: &RunWorld,
+    threads: usize,
+    stop: &StopRequest,
+    observer: &mut dyn Observer,
+) -> Result<Summary> {
     RunFolder::check_free(path)?;
     let made = {
         let (own, world, asked) = (config.clone(), world.clone(), stop.clone());
+        let weights = initial.map(|initial| initial.bytes.clone());
         let make = move || -> Result<_> {
-            let trainer = Trainer::in_world(&own, &world, threads)?;
+            let trainer = beginning(weights.as_deref(), &own, &world, threads)?;
             Ok(Reporting::new(trainer, &own, &asked))
         };
         Apart::start(make, stop)
     };
     let Ok(training) = made else {
         // Nothing is made yet, and the run can go on from there.
-        RunFolder::prepare(path, config, threads)?;
+        let mut folder = RunFolder::create_from(path, config, initial, threads)?;
+        folder.set_status(Status::Interrupted)?;
         return Err(interrupted(path, 0));
     };
     let mut training = training?;
-    let mut folder = RunFolder::create(path, config, threads)?;
+    let mut folder = RunFolder::create_from(path, config, initial, threads)?;
     train_into(&mut folder, &mut training, config, stop, observer)
 }
 
@@ -132,6 +151,7 @@ pub fn resume(
         mut folder,
         config,
         checkpoint,
+        initial,
         damaged,
         metrics_put_aside,
         weights_lost,
@@ -163,7 +183,7 @@ pub fn resume(
         let make = move || -> Result<_> {
             let trainer = match checkpoint {
                 Some(checkpoint) => Trainer::resumed(&own, &world, threads, &checkpoint)?,
-                None => Trainer::in_world(&own, &world, threads)?,
+                None => beginning(initial.as_deref(), &own, &world, threads)?,
             };
             Ok(Reporting::new(trainer, &own, &asked))
         };
@@ -174,6 +194,19 @@ pub fn resume(
         return Err(interrupted(path, latest_row(path).steps_env));
     };
     train_into(&mut folder, &mut training?, &config, stop, observer).map(Some)
+}
+
+/// A trainer of a run at its beginning.
+fn beginning(
+    initial: Option<&[u8]>,
+    config: &Config,
+    world: &RunWorld,
+    threads: usize,
+) -> Result<Trainer, mackrl::Error> {
+    match initial {
+        Some(weights) => Trainer::beginning_with(weights, config, world, threads),
+        None => Trainer::in_world(config, world, threads),
+    }
 }
 
 /// That the run at `path` was asked to stop.

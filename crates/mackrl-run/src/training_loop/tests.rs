@@ -155,7 +155,9 @@ fn a_run_that_is_asked_to_stop_writes_a_checkpoint_first() {
     });
     let message = outcome.unwrap_err().to_string();
     assert!(
-        message.ends_with("was interrupted at 1 environment steps"),
+        message.contains(
+            "was stopped at 1 environment steps; its metrics and its latest checkpoint are kept"
+        ),
         "{message}"
     );
     assert_eq!(status(&path), "interrupted");

@@ -128,7 +128,7 @@ fn connect(process: &mut GameProcess, settings: &GameSettings) -> Result<Client,
         if began.elapsed() > settings.launch_patience {
             let waited = settings.launch_patience.as_secs_f64();
             return Err(GameFault::Launch(format!(
-                "nobody listened within {waited:.1} s: {failure}"
+                "no game answered within {waited:.1} s: {failure}"
             )));
         }
         thread::sleep(KNOCK);

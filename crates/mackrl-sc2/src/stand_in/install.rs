@@ -40,7 +40,7 @@ pub fn install(folder: &Path, server: &Path) -> io::Result<Installed> {
     );
     if is_real(&program)? {
         let message = format!(
-            "{} is a program of somebody else's, which is left alone",
+            "{} is another program, which is left alone",
             program.display()
         );
         return Err(io::Error::new(io::ErrorKind::AlreadyExists, message));

@@ -12,6 +12,7 @@ mod mackrl;
 mod ppo;
 mod q_learning;
 mod qmix;
+mod shared_settings;
 mod state;
 mod vdn;
 
@@ -22,7 +23,7 @@ use mackrl_env::{
     settings::{Setting, SettingsError},
 };
 
-pub use actor_critic::{ActorCritic, ActorCriticSettings, OptimiserName};
+pub use actor_critic::{ActorCritic, ActorCriticSettings};
 pub use agentwise::{
     Advantage, Agentwise, AgentwiseKind, AgentwiseSettings, Coma, Counterfactual, Iac, Judge,
     OwnObservation,
@@ -33,8 +34,11 @@ pub use mackrl::{Levels, Mackrl, MackrlSettings, PartitionChoice};
 pub use ppo::{
     Groups, Ippo, MackrlPpo, MackrlPpoSettings, Mappo, PairMemory, Ppo, PpoSettings, Sight,
 };
-pub use q_learning::{ActionValues, QLearner, QLearningSettings};
+pub use q_learning::{
+    ActionValues, Decomposition, QLearner, QLearningSettings, ValueDecomposition,
+};
 pub use qmix::{Qmix, QmixSettings};
+pub use shared_settings::{NoSettings, OptimiserName};
 pub use state::{AlgorithmState, StoredState};
 pub use vdn::{Summed, Vdn};
 
@@ -201,9 +205,9 @@ pub fn built_in() -> Vec<Arc<dyn AlgorithmKind>> {
         Arc::new(MackrlPpo),
         Arc::new(Mappo::default()),
         Arc::new(Ippo::default()),
-        Arc::new(Iql),
-        Arc::new(Vdn),
-        Arc::new(Qmix),
+        Arc::new(Iql::default()),
+        Arc::new(Vdn::default()),
+        Arc::new(Qmix::default()),
         Arc::new(Iac::default()),
         Arc::new(Coma::default()),
     ]

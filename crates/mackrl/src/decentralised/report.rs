@@ -178,7 +178,7 @@ impl Certificate {
         });
     }
 
-    /// What was proved, in one sentence; `world` is what was played.
+    /// What was proved, in a few sentences, the first of which says it in short; `world` is what was played.
     #[must_use]
     pub fn proved(&self, world: &str) -> String {
         let Self {
@@ -201,20 +201,21 @@ impl Certificate {
             }
         };
         let computed = if self.outputs_compared > 0 {
-            "read the same inputs, gave the same log-probabilities and took the same action"
+            "inputs, log-probabilities and actions"
         } else {
-            "read the same inputs and took the same action"
+            "inputs and actions"
         };
         let state = match self.altered_states_compared {
             0 => String::new(),
             count => format!(
-                ", and that what they observed did not change either when the state of the world was altered beyond their sight ({count} times)"
+                " What an agent observed did not change either when the state of the world was altered beyond its sight ({count} times)."
             ),
         };
         format!(
-            "For {episodes} sampled and {episodes} greedy episodes of {world}, {steps} steps, it was proved that {agents} agents, {apart}, given \
-             nothing but their own local views, their numbers, the weights and the key of their choices, {computed}, bit for bit, as in \
-             the central run, that nothing of this changed when everything that an agent does not see was replaced by noise{state}."
+            "Certified: the team runs decentralised on {world}, in {episodes} sampled and {episodes} greedy episodes of {steps} steps together. \
+             {agents} agents, {apart}, were given their own local views, their numbers, the weights and the key of their choices, and \
+             nothing else. Their {computed} were those of the central run, bit for bit. Nothing of this changed when everything that an \
+             agent does not see was replaced by noise.{state}"
         )
     }
 

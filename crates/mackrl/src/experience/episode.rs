@@ -14,7 +14,7 @@ pub struct Episode {
     pub observation_tno: Vec<f32>,
     /// Which actions each agent has \[T + 1, N, A\], as `observation_tno`.
     pub available_tna: Vec<bool>,
-    /// Joint actions \[T, N\]; empty unless recorded for learning.
+    /// Joint actions \[T, N\].
     pub action_tn: Vec<Action>,
     /// Agents that live before each step \[T\]; empty unless recorded for learning.
     pub alive_t: Vec<EntitySet>,

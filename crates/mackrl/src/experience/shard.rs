@@ -14,7 +14,7 @@ use super::{Experience, PlaySettings};
 use crate::{
     Error, NotFinite, Phase,
     nn::first_not_finite,
-    policy::{Actor, Parameters, Recording, Situation},
+    policy::{Actor, Parameters, Situation},
 };
 
 /// Times that the same episodes are begun anew because a world fails under them, before the run gives up.
@@ -174,9 +174,7 @@ impl Shard {
         check_finite(&self.observations, b, step + 1)?;
         let needs_views = self.piece.actor.needs_views();
         let episode = &mut self.piece.experience.episodes[b];
-        if settings.recording == Recording::ForLearning {
-            episode.action_tn.extend_from_slice(actions);
-        }
+        episode.action_tn.extend_from_slice(actions);
         episode.reward_t.push(time_step.reward);
         episode.end = time_step.end;
         let shown = (&self.observations, b);

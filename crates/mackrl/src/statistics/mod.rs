@@ -13,11 +13,13 @@ mod bootstrap;
 mod comparison;
 mod crossing;
 mod sample;
+mod student;
 
 pub use bootstrap::{Aggregate, Bootstrap, Interval};
 pub use comparison::probability_of_improvement;
 pub use crossing::{Crossings, first_crossing, interpolate};
 pub use sample::{interquartile_mean, mean, mean_and_standard_error, median, quantile};
+pub use student::student_factor;
 
 #[cfg(test)]
 mod tests;

@@ -71,7 +71,7 @@ fn measure(args: &BenchTrainArgs) -> anyhow::Result<TrainingSpeed> {
     Ok(TrainingSpeed {
         map: config.env.map().to_owned(),
         algorithm: config.algorithm.name().to_owned(),
-        preset: typed.preset.clone(),
+        preset: typed.preset().to_owned(),
         simd: InstructionSet::chosen()?.name(),
         threads,
         steps: trainer.steps_env(),

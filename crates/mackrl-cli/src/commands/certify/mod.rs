@@ -40,7 +40,7 @@ const PASSED_ON: [&str; 2] = ["MACKRL_SIMD", "PATH"];
 /// A certificate with what it says.
 #[derive(Debug, Serialize)]
 struct Stated<'a> {
-    /// What was proved, in one sentence.
+    /// What was proved, the first sentence in short.
     proved: String,
     /// What was not, a sentence each.
     not_proved: Vec<&'static str>,
@@ -250,14 +250,16 @@ fn verdict(certificate: &Value) -> anyhow::Result<()> {
     }
 }
 
+/// What was counted, in words.
 fn table(certificate: &Value) -> String {
-    let rows: Vec<Vec<String>> = certificate
-        .as_object()
-        .into_iter()
-        .flatten()
-        .filter(|(_, value)| !value.is_null())
-        .map(|(name, value)| vec![name.clone(), value.to_string()])
-        .collect();
+    let count = |(name, meaning): &(&str, &str)| {
+        let count = certificate.get(name)?;
+        let count = count
+            .as_str()
+            .map_or_else(|| count.to_string(), str::to_owned);
+        Some(vec![(*meaning).to_owned(), count])
+    };
+    let rows: Vec<Vec<String>> = page::COUNTS.iter().filter_map(count).collect();
     output::table(&rows)
 }
 
@@ -279,11 +281,11 @@ mod tests {
     }
 
     #[test]
-    fn what_was_not_found_is_not_listed() {
-        let certificate = json!({ "episodes": 100, "first_mismatch": null, "mismatches": 0 });
+    fn what_was_counted_is_told_in_words() {
+        let certificate = json!({ "first_mismatch": null, "mismatches": 0, "steps": 150 });
         insta::assert_snapshot!(table(&certificate), @r"
-        episodes    100
-        mismatches    0
+        Steps of the world       150
+        Comparisons that failed    0
         ");
     }
 }

@@ -14,11 +14,11 @@ td:last-child { font-variant-numeric: tabular-nums; } @media print { body { marg
 ";
 
 /// What each count means, in the order of the page.
-const COUNTS: [(&str, &str); 15] = [
+pub(super) const COUNTS: [(&str, &str); 15] = [
     ("agents", "Agents of the team"),
     (
         "isolation",
-        "What keeps the agents apart: system-calls (a filter of the operating system), processes, or none",
+        "What keeps the agents apart: system-calls, processes or none",
     ),
     (
         "episodes",
@@ -55,7 +55,7 @@ const COUNTS: [(&str, &str); 15] = [
     ),
     (
         "altered_states_compared",
-        "Observations after the state of the world was altered beyond the agent's sight",
+        "Observations after the state was altered beyond the agent's sight",
     ),
     (
         "other_key_compared",

@@ -11,7 +11,7 @@ use mackrl_skirmish::{
 };
 use serde::Serialize;
 
-use super::row::Row;
+use super::{known::Known, row::Row};
 
 /// A map with its armies and its terrain.
 #[derive(Debug, Serialize)]
@@ -50,7 +50,7 @@ pub(super) struct MatrixGameCard {
 }
 
 impl Card {
-    pub(super) fn of(skirmish: &Skirmish) -> Self {
+    pub(super) fn of(skirmish: &Skirmish, known: Option<Known>) -> Self {
         let scenario = skirmish.scenario();
         let [allies, enemies] = scenario.armies.clone();
         let start = |recruit: &Recruit| Start {
@@ -61,7 +61,7 @@ impl Card {
             at: recruit.at,
         };
         Self {
-            row: Row::of(skirmish),
+            row: Row::of(skirmish, known),
             allies,
             enemies,
             enemy_order: scenario.enemy_order,
@@ -169,10 +169,18 @@ impl fmt::Display for Card {
         for (name, value) in lines {
             writeln!(formatter, "{name:<12}{value}")?;
         }
+        if let Some(known) = &row.known {
+            writeln!(
+                formatter,
+                "{:<12}{}, on the real game",
+                "difficulty", known.difficulty
+            )?;
+            writeln!(formatter, "{:<12}{}", "won", known.words())?;
+        }
         let edge = MAP_SIZE;
         writeln!(
             formatter,
-            "\nThe start: A agents, e enemies, ## where nobody walks. {edge} × {edge} cells of one map unit, (0, 0) at the lower left.\n"
+            "\nThe start: A agents, e enemies, ## where no unit can walk. {edge} × {edge} cells of one map unit, (0, 0) at the lower left.\n"
         )?;
         formatter.write_str(&self.picture())
     }

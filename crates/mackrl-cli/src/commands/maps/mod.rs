@@ -1,12 +1,14 @@
 //! `mackrl maps`: what can be played.
 
 mod card;
+mod known;
 mod row;
 
 use std::path::Path;
 
 use anyhow::Context;
 use card::Card;
+use known::Known;
 use mackrl_env::matrix_game::MATRIX_GAME;
 use mackrl_run::{
     config::{ConfigBuilder, ConfigError},
@@ -21,15 +23,17 @@ use crate::{
 };
 
 /// What the list does not hold: people who want "all maps" want SMAC's.
-const ALSO: &str = "\nBesides these, --map takes matrix-game, the game of the paper's Figure 5, and FILE.toml, a scenario of your own.\n\
-                    `mackrl maps NAME` shows one of them with its armies and its terrain.\n";
+const ALSO: &str = "\ndifficulty: on the real game, by Yu and others, 2021. scripted, trained: battles won here by the best script and the best\n\
+                    trained team in this repository; empty where nothing is measured.\n\
+                    Besides these, --map takes matrix-game, the game of the paper's Figure 5, and FILE.toml, a scenario of your own.\n\
+                    `mackrl maps NAME` shows one of them with its armies, sizes of its arrays and terrain.\n";
 
 pub(crate) fn run(args: &MapsArgs) -> anyhow::Result<()> {
     if let Some(name) = &args.map {
         return show(name, args.json);
     }
     let rows = match &args.check {
-        Some(file) => vec![Row::of(&checked(file)?)],
+        Some(file) => vec![Row::of(&checked(file)?, None)],
         None => all()?,
     };
     if args.json {
@@ -45,7 +49,10 @@ fn all() -> anyhow::Result<Vec<Row>> {
     names
         .map(|name| {
             let skirmish = mackrl_skirmish::make(name, &SkirmishSettings::default());
-            Ok(Row::of(&skirmish.context("cannot list the maps")?))
+            Ok(Row::of(
+                &skirmish.context("cannot list the maps")?,
+                Known::of(name),
+            ))
         })
         .collect()
 }
@@ -66,7 +73,9 @@ fn show(name: &str, json: bool) -> anyhow::Result<()> {
             output::print(&game.to_string())
         };
     }
-    let card = Card::of(&world.skirmish()?);
+    // A scenario of one's own may be called as a map of SMAC is.
+    let known = Known::of(name).filter(|_| world.text("scenario").is_empty());
+    let card = Card::of(&world.skirmish()?, known);
     if json {
         output::print_json(&card)
     } else {

@@ -4,6 +4,7 @@ use mackrl_env::Environment;
 use mackrl_skirmish::{Skirmish, rules::Team, scenario::Race};
 use serde::Serialize;
 
+use super::known::{self, Known};
 use crate::output;
 
 /// The numbers of a map, by the names that SMAC users know. A pair of features is how many rows there are and how long each is.
@@ -36,10 +37,12 @@ pub(super) struct Row {
     pub(super) max_reward: f64,
     /// What rewards are multiplied by.
     pub(super) reward_scale: f64,
+    /// How hard it is and the best results; `null` for a scenario.
+    pub(super) known: Option<Known>,
 }
 
 impl Row {
-    pub(super) fn of(skirmish: &Skirmish) -> Self {
+    pub(super) fn of(skirmish: &Skirmish, known: Option<Known>) -> Self {
         let (spec, layout, scenario) = (skirmish.spec(), skirmish.layout(), skirmish.scenario());
         let max_reward = f64::from(skirmish.max_reward());
         let health = |kind: u8| {
@@ -72,6 +75,7 @@ impl Row {
             enemy_health: enemies.map(|enemy| health(enemy.kind)).sum(),
             max_reward,
             reward_scale: f64::from(skirmish.settings().reward_scale_rate) / max_reward,
+            known,
         }
     }
 
@@ -79,26 +83,30 @@ impl Row {
     pub(super) fn table(rows: &[Self]) -> String {
         let heading = [
             "name",
-            "n_agents",
-            "n_enemies",
-            "n_actions",
-            "obs_size",
-            "state_size",
-            "episode_limit",
+            "sides",
+            "races",
+            "kind",
+            "steps",
+            "difficulty",
+            "scripted",
+            "trained",
         ];
         let mut cells = vec![heading.map(str::to_owned).to_vec()];
         cells.extend(rows.iter().map(|row| {
-            let numbers = [
-                row.n_agents,
-                row.n_enemies,
-                row.n_actions,
-                row.obs_size,
-                row.state_size,
-                row.episode_limit,
-            ];
-            let mut line = vec![row.name.clone()];
-            line.extend(numbers.map(|number| number.to_string()));
-            line
+            let known = row.known.as_ref();
+            let share = |result: Option<&known::Result>| {
+                result.map_or_else(String::new, known::Result::share)
+            };
+            vec![
+                row.name.clone(),
+                format!("{} v {}", row.n_agents, row.n_enemies),
+                format!("{} v {}", row.a_race, row.b_race),
+                row.map_type.unwrap_or_default().to_owned(),
+                row.episode_limit.to_string(),
+                known.map_or_else(String::new, |known| known.difficulty.to_owned()),
+                share(known.and_then(Known::scripted)),
+                share(known.and_then(Known::trained)),
+            ]
         }));
         output::table(&cells)
     }

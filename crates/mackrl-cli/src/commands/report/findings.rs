@@ -4,6 +4,7 @@ use mackrl_run::provenance::Provenance;
 
 use mackrl::statistics::{
     Aggregate, Bootstrap, Crossings, Interval, mean_and_standard_error, probability_of_improvement,
+    student_factor,
 };
 use serde::Serialize;
 
@@ -12,6 +13,9 @@ use crate::args::ReportArgs;
 
 /// Levels of a share that curves are asked about.
 const LEVELS: [f64; 3] = [0.5, 0.7, 0.9];
+
+/// Runs of each of two learners from which on they are compared.
+pub(super) const RUNS_LEAST: usize = 5;
 
 /// What the runs show.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -48,6 +52,8 @@ pub(super) struct AlgorithmFindings {
     pub(super) averages: Averages,
     /// Standard error of the mean.
     pub(super) standard_error: f64,
+    /// The 95 % interval of the mean by Student's t, of more than one run.
+    pub(super) student_interval: Option<[f64; 2]>,
     /// Environment steps until levels are first reached.
     pub(super) steps_to: Vec<Crossings>,
 }
@@ -75,6 +81,8 @@ pub(super) struct Comparison {
     pub(super) second: String,
     /// That a run of the first scores higher than a run of the second.
     pub(super) probability_of_improvement: Interval,
+    /// Whether there are runs enough to say so.
+    pub(super) tested: bool,
 }
 
 impl Findings {
@@ -122,6 +130,7 @@ impl MapFindings {
             runs: cell.scores.len(),
             averages: Averages::of(std::slice::from_ref(&cell.scores), bootstrap),
             standard_error: mean_and_standard_error(&cell.scores).1,
+            student_interval: student_interval(&cell.scores),
             steps_to: LEVELS
                 .map(|level| Crossings::of(&cell.curves, level))
                 .into(),
@@ -158,6 +167,14 @@ fn overall(scores: &Scores, bootstrap: Bootstrap) -> Vec<Overall> {
     complete.iter().enumerate().map(of).collect()
 }
 
+/// The 95 % interval of the mean.
+fn student_interval(scores: &[f64]) -> Option<[f64; 2]> {
+    let (mean, error) = mean_and_standard_error(scores);
+    let degrees = scores.len().checked_sub(1).filter(|&degrees| degrees > 0)?;
+    let half = student_factor(degrees as f64) * error;
+    Some([mean - half, mean + half])
+}
+
 impl Averages {
     fn of(tasks: &[Vec<f64>], bootstrap: Bootstrap) -> Self {
         let average = |aggregate: Aggregate| bootstrap.interval(tasks, |tasks| aggregate.of(tasks));
@@ -180,6 +197,7 @@ impl Comparison {
             first: names[0].to_owned(),
             second: names[1].to_owned(),
             probability_of_improvement: bootstrap.interval(&both, improvement),
+            tested: both.iter().all(|runs| runs.len() >= RUNS_LEAST),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use mackrl::statistics::Crossings;
 
-use super::findings::{Averages, Comparison, Findings, MapFindings};
+use super::findings::{Averages, Comparison, Findings, MapFindings, RUNS_LEAST};
 use crate::{output, reproduce::interval};
 
 /// The report as it reads.
@@ -14,6 +14,13 @@ pub(super) fn text(findings: &Findings) -> String {
         100.0 * findings.confidence,
         findings.resamples
     );
+    let learners = findings.maps.iter().flat_map(|map| &map.algorithms);
+    if learners
+        .map(|learner| learner.runs)
+        .any(|runs| (2..RUNS_LEAST).contains(&runs))
+    {
+        text += "of fewer than 5 runs, bootstrap intervals are too narrow: Student's t gives wider ones\n";
+    }
     for map in &findings.maps {
         text += &format!("\n{}\n", map.map);
         text += &indented(&averages_of(map));
@@ -51,7 +58,7 @@ fn averages_of(map: &MapFindings) -> Vec<Vec<String>> {
         "interquartile mean",
         "median",
         "mean",
-        "± error",
+        "mean by Student's t",
     ]);
     let rows = map.algorithms.iter().map(|algorithm| {
         let mut row = vec![algorithm.algorithm.clone(), algorithm.runs.to_string()];
@@ -62,7 +69,8 @@ fn averages_of(map: &MapFindings) -> Vec<Vec<String>> {
             return row;
         }
         row.extend(averages(&algorithm.averages));
-        row.push(format!("{:.3}", algorithm.standard_error));
+        let student = algorithm.student_interval;
+        row.extend(student.map(|[low, high]| format!("[{low:.3}, {high:.3}]")));
         row
     });
     [vec![heading], rows.collect()].concat()
@@ -88,9 +96,14 @@ fn steps_of(map: &MapFindings) -> Vec<Vec<String>> {
 fn comparisons(comparisons: &[Comparison]) -> Vec<Vec<String>> {
     let heading = words(&["probability of improvement", ""]);
     let rows = comparisons.iter().map(|comparison| {
+        let found = if comparison.tested {
+            interval(comparison.probability_of_improvement)
+        } else {
+            format!("not tested: needs {RUNS_LEAST} runs of each")
+        };
         vec![
             format!("{} over {}", comparison.first, comparison.second),
-            interval(comparison.probability_of_improvement),
+            found,
         ]
     });
     [vec![heading], rows.collect()].concat()

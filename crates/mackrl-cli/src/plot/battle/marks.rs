@@ -3,14 +3,13 @@
 use super::{Figure, INK, PAPER, Side};
 use crate::plot::{
     chart::Colour,
-    scene::{Anchor, Direction, Rectangle, Shape, Weight, Words},
-    text,
+    scene::{Anchor, Direction, Rectangle, Shape, Stroke, Weight, Words},
 };
 
 const EMPTY_BAR: Colour = Colour(0xD8, 0xD8, 0xD8);
 
-/// A disc or a diamond with the letter of its type.
-pub(super) fn body(at: [f64; 2], figure: &Figure, radius: f64) -> Vec<Shape> {
+/// A disc or a diamond with the letters of its type.
+pub(super) fn body(at: [f64; 2], figure: &Figure, radius: f64, opacity: f64) -> Vec<Shape> {
     let outline = |radius: f64| match figure.side {
         Side::Ally => circle(at, radius, 40),
         // As large as the disc of the same radius.
@@ -18,16 +17,20 @@ pub(super) fn body(at: [f64; 2], figure: &Figure, radius: f64) -> Vec<Shape> {
     };
     let mut shapes = vec![
         filled(&outline(radius + 1.4), PAPER, 1.0),
-        filled(&outline(radius), figure.side.colour(), 1.0),
+        filled(&outline(radius), figure.side.colour(), opacity),
     ];
     let size = (1.05 * radius).clamp(6.0, 22.0);
-    let letters = figure.kind.chars().take(1);
-    let letter: String = letters.flat_map(char::to_uppercase).collect();
+    // Two letters have to find room too.
+    let size = if figure.letters.chars().count() > 1 {
+        0.8 * size
+    } else {
+        size
+    };
     // In the upper part, because bars stand in the lower.
     let at = [at[0], at[1] + 0.36 * size - 0.28 * radius];
     shapes.push(Shape::Words(Words {
         anchor: Anchor::Middle,
-        ..label(&letter, at, size, Weight::Medium, PAPER)
+        ..label(&figure.letters, at, size, Weight::Medium, PAPER)
     }));
     shapes
 }
@@ -71,9 +74,9 @@ pub(super) fn bar(
     filled(&rectangle.corners(), colour, 1.0)
 }
 
-/// Where somebody fell.
+/// Where a unit fell.
 pub(super) fn cross([x, y]: [f64; 2], arm: f64) -> Vec<Shape> {
-    let line = |ends: [[f64; 2]; 2]| open(&ends, Colour(0x9A, 0x95, 0x8A), 2.2, false);
+    let line = |ends: [[f64; 2]; 2]| open(&ends, Colour(0x9A, 0x95, 0x8A), 2.2, Stroke::Solid);
     vec![
         line([[x - arm, y - arm], [x + arm, y + arm]]),
         line([[x - arm, y + arm], [x + arm, y - arm]]),
@@ -99,18 +102,18 @@ pub(super) fn filled(points: &[[f64; 2]], colour: Colour, opacity: f64) -> Shape
     }
 }
 
-pub(super) fn open(points: &[[f64; 2]], colour: Colour, width: f64, dashed: bool) -> Shape {
+pub(super) fn open(points: &[[f64; 2]], colour: Colour, width: f64, stroke: Stroke) -> Shape {
     Shape::Line {
         points: points.to_vec(),
         colour,
         width,
-        dashed,
+        stroke,
     }
 }
 
-pub(super) fn closed(points: &[[f64; 2]], colour: Colour, width: f64) -> Shape {
+pub(super) fn closed(points: &[[f64; 2]], colour: Colour, width: f64, stroke: Stroke) -> Shape {
     let points: Vec<[f64; 2]> = points.iter().chain(points.first()).copied().collect();
-    open(&points, colour, width, false)
+    open(&points, colour, width, stroke)
 }
 
 pub(super) fn words(text: &str, at: [f64; 2], size: f64, weight: Weight, colour: Colour) -> Shape {
@@ -129,50 +132,23 @@ pub(super) fn label(text: &str, at: [f64; 2], size: f64, weight: Weight, colour:
     }
 }
 
-pub(super) fn moved(mut shape: Shape, [dx, dy]: [f64; 2]) -> Shape {
-    let by = |point: &mut [f64; 2]| *point = [point[0] + dx, point[1] + dy];
-    match &mut shape {
-        Shape::Polygon { points, .. } | Shape::Line { points, .. } => {
-            points.iter_mut().for_each(by);
-        }
-        Shape::Ring { centre, .. } => by(centre),
-        Shape::Words(words) => by(&mut words.at),
-    }
-    shape
+/// A missile in flight.
+pub(super) fn missile(at: [f64; 2]) -> Vec<Shape> {
+    vec![
+        filled(&circle(at, 3.6, 16), PAPER, 1.0),
+        filled(&circle(at, 2.6, 16), INK, 1.0),
+    ]
 }
 
-/// A closed line of dashes.
-pub(super) fn closed_dashed(points: &[[f64; 2]], colour: Colour, width: f64) -> Shape {
-    let points: Vec<[f64; 2]> = points.iter().chain(points.first()).copied().collect();
-    open(&points, colour, width, true)
-}
-
-/// What binds two agents that were paired: a broad band if they acted jointly, dashes if they delegated.
+/// What binds two agents that are paired: a broad band if they act jointly, dashes if they delegate.
 pub(super) fn link(ends: [[f64; 2]; 2], is_joint: bool) -> Vec<Shape> {
-    let casing = open(&ends, PAPER, 9.0, false);
+    let casing = open(&ends, PAPER, 9.0, Stroke::Solid);
     if is_joint {
         return vec![
             casing,
-            open(&ends, Colour::GREEN, 7.0, false),
-            open(&ends, PAPER, 2.2, false),
+            open(&ends, Colour::GREEN, 7.0, Stroke::Solid),
+            open(&ends, PAPER, 2.2, Stroke::Solid),
         ];
     }
-    vec![casing, open(&ends, Colour::PURPLE, 4.0, true)]
-}
-
-/// The name of a unit, above it and to the right.
-pub(super) fn name_tag(at: [f64; 2], figure: &Figure, radius: f64) -> Vec<Shape> {
-    const SIZE: f64 = 11.5;
-    let at = [at[0] + 0.75 * radius + 1.0, at[1] - 0.8 * radius - 1.0];
-    let width = text::width(&figure.name, SIZE, Weight::Medium);
-    let plate = Rectangle {
-        left: at[0] - 1.5,
-        top: at[1] - 0.8 * SIZE,
-        right: at[0] + width + 1.5,
-        bottom: at[1] + 1.5,
-    };
-    vec![
-        filled(&plate.corners(), PAPER, 0.75),
-        words(&figure.name, at, SIZE, Weight::Medium, INK),
-    ]
+    vec![casing, open(&ends, Colour::PURPLE, 4.0, Stroke::Dashed)]
 }

@@ -1,13 +1,18 @@
 //! Who knew what at one step, and what the controllers made of it, in names that people read.
 
+mod only;
 mod text;
 
 use mackrl::policy::{GroupChoice, PairThought, Thought};
 use mackrl_env::{Action, AgentId, EntityId, EntitySet};
-use mackrl_run::replay::{GroupKnowledge, Summary};
+use mackrl_run::replay::{GroupKnowledge, Summary, living_groups};
 use serde::Serialize;
 
 use super::Opened;
+pub(crate) use only::About;
+
+/// How the choice of a partition is called among controllers.
+const PARTITION: &str = "partition";
 
 /// The facts of one step.
 #[derive(Debug, Serialize)]
@@ -23,7 +28,7 @@ pub(crate) struct Explanation {
     views: Vec<View>,
     /// What every pair of living agents knows.
     knowledge: Vec<Knowledge>,
-    /// What everybody did.
+    /// What every agent did.
     actions: Vec<Taken>,
     /// What the controllers computed, if there are any.
     controllers: Option<Controllers>,
@@ -236,7 +241,7 @@ impl Writer<'_> {
         Controllers {
             partitions: partitions
                 .map(|(index, partition)| Partition {
-                    groups: self.groups(&partition.groups),
+                    groups: self.groups(&living_groups(thought, partition)),
                     probability: partition.probability,
                     posterior: partition.posterior,
                     is_chosen: thought.chosen == Some(index),
@@ -298,8 +303,8 @@ impl Writer<'_> {
         let mut path = Vec::new();
         let chosen = thought.chosen.map(|index| &thought.partitions[index]);
         path.extend(chosen.map(|partition| Chosen {
-            controller: "partition".to_owned(),
-            choice: self.groups(&partition.groups),
+            controller: PARTITION.to_owned(),
+            choice: self.groups(&living_groups(thought, partition)),
             probability: partition.probability,
         }));
         let mut together = EntitySet::EMPTY;

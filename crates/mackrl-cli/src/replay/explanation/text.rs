@@ -4,9 +4,11 @@ use std::fmt;
 
 use mackrl::policy::GroupChoice;
 
-use super::{Controllers, Explanation, Knowledge, Pair};
+use super::{Controllers, Entry, Explanation, Knowledge, Pair};
 use crate::output;
 
+/// Below this probability, entries are summed up instead of listed.
+const IMPROBABLE: f32 = 0.001;
 /// Pairs up to which those that know nothing in common are listed one by one.
 const PAIRS_LISTED: usize = 28;
 
@@ -116,13 +118,20 @@ impl Controllers {
         if !self.partitions.is_empty() {
             writeln!(out, "\nPartitions (> was chosen)")?;
             let mut rows = vec![words(["  partition", "probability", "posterior"])];
-            rows.extend(self.partitions.iter().map(|partition| {
+            let (listed, others) = apart(&self.partitions, |partition| {
+                (
+                    partition.probability.max(partition.posterior),
+                    partition.is_chosen,
+                )
+            });
+            rows.extend(listed.iter().map(|partition| {
                 vec![
                     format!("{} {}", mark(partition.is_chosen), partition.groups),
                     format!("{:.4}", partition.probability),
                     format!("{:.4}", partition.posterior),
                 ]
             }));
+            rows.extend(and_others("", &others, |partition| partition.probability));
             out.write_str(&indented(&output::table(&rows)))?;
         }
         if !self.pairs.is_empty() {
@@ -134,17 +143,10 @@ impl Controllers {
             out,
             "\nAgents alone (> was taken by the agent, jointly or alone)"
         )?;
-        let rows = self.agents.iter().flat_map(|agent| {
-            agent.options.iter().map(|option| {
-                let name = format!(
-                    "{}: {} {}",
-                    agent.agent,
-                    mark(option.is_taken),
-                    option.action
-                );
-                vec![name, format!("{:.4}", option.probability)]
-            })
-        });
+        let rows = self
+            .agents
+            .iter()
+            .flat_map(|agent| entries(&agent.agent, &agent.options, |option| option.is_taken));
         out.write_str(&indented(&output::table(&rows.collect::<Vec<_>>())))?;
         writeln!(out, "\nThe way that was taken")?;
         let mut rows: Vec<Vec<String>> = (self.path.iter())
@@ -168,13 +170,49 @@ impl Pair {
             mark(self.choice == Some(GroupChoice::Delegate))
         );
         let mut rows = vec![vec![delegate, format!("{:.4}", self.delegate_probability)]];
-        rows.extend(self.joint.iter().map(|option| {
-            let is_taken = option.is_taken && self.choice == Some(GroupChoice::Joint);
-            let name = format!("{members}: {} {}", mark(is_taken), option.action);
-            vec![name, format!("{:.4}", option.probability)]
+        let acted_jointly = self.choice == Some(GroupChoice::Joint);
+        rows.extend(entries(&members, &self.joint, |option| {
+            option.is_taken && acted_jointly
         }));
         rows
     }
+}
+
+/// The entries of a controller's table, of which improbable ones are summed up.
+fn entries(controller: &str, all: &[Entry], is_taken: impl Fn(&Entry) -> bool) -> Vec<Vec<String>> {
+    let (listed, others) = apart(all, |entry| (entry.probability, is_taken(entry)));
+    let rows = listed.iter().map(|entry| {
+        let name = format!("{controller}: {} {}", mark(is_taken(entry)), entry.action);
+        vec![name, format!("{:.4}", entry.probability)]
+    });
+    let others = and_others(&format!("{controller}: "), &others, |entry| {
+        entry.probability
+    });
+    rows.chain(others).collect()
+}
+
+/// What is listed one by one, and what is improbable and was not taken.
+fn apart<T>(all: &[T], of: impl Fn(&T) -> (f32, bool)) -> (Vec<&T>, Vec<&T>) {
+    let (listed, others): (Vec<&T>, Vec<&T>) = all.iter().partition(|entry| {
+        let (probability, is_taken) = of(entry);
+        is_taken || probability >= IMPROBABLE
+    });
+    match others.len() {
+        // A line of its own says more than "and 1 other".
+        1 => (all.iter().collect(), Vec::new()),
+        _ => (listed, others),
+    }
+}
+
+/// "and 34 others", with their probability together.
+fn and_others<T>(
+    controller: &str,
+    others: &[&T],
+    probability: impl Fn(&T) -> f32,
+) -> Option<Vec<String>> {
+    let together: f32 = others.iter().map(|entry| probability(entry)).sum();
+    let name = format!("{controller}  and {} others", others.len());
+    (!others.is_empty()).then(|| vec![name, format!("{together:.4}")])
 }
 
 fn mark(is_chosen: bool) -> char {

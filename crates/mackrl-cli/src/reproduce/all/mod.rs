@@ -18,7 +18,7 @@ use super::{
     learning::{LearningOptions, Report},
     make_folder, write,
 };
-use crate::progress::Meter;
+use crate::{progress::Meter, signals};
 use page::Section;
 
 /// The page's name.
@@ -67,7 +67,9 @@ pub(crate) fn run(options: &AllOptions) -> anyhow::Result<AllReport> {
     let out = &learning.out;
     make_folder(out)?;
     let meter = Meter::new("runs of figure 5");
+    let stop = signals::listen()?;
     let figure5 = figure5::run(&figure5_options(out)?, &|done, total| {
+        signals::end_if_asked(&stop, "figure 5");
         meter.report(done, total);
     })?;
     let figure6 = figure6::FIGURE.run(learning, None)?;
@@ -153,11 +155,7 @@ impl Display for AllReport {
     fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
         writeln!(out, "{}\n", self.command)?;
         for (figure, claim) in self.claims() {
-            let verdict = if claim.holds {
-                "holds"
-            } else {
-                "does not hold"
-            };
+            let verdict = claim.verdict.words();
             writeln!(out, "  {figure:<10} {verdict:<14} {}", claim.claim)?;
         }
         writeln!(out, "\n{}", self.page.display())

@@ -1,7 +1,10 @@
 //! The report as one HTML page that needs no other file.
 
 use super::Claim;
-use crate::{output::escaped, reproduce::ClaimSource};
+use crate::{
+    output::escaped,
+    reproduce::{ClaimSource, Verdict},
+};
 use mackrl_run::provenance::CODE;
 
 const STYLE: &str = include_str!("page.css");
@@ -20,16 +23,21 @@ pub(super) struct Section<'a> {
 
 /// The whole page.
 pub(super) fn html(command: &str, claims: &[(&str, &Claim)], sections: &[Section<'_>]) -> String {
-    let held = claims.iter().filter(|(_, claim)| claim.holds).count();
+    let count = |verdict| {
+        let judged = claims.iter().filter(|(_, claim)| claim.verdict == verdict);
+        judged.count()
+    };
     let mut body = format!(
         "<h1>MACKRL, reproduced</h1>\n\
          <p>Multi-Agent Common Knowledge Reinforcement Learning (Foerster, Schroeder de Witt and others, 2018) in a simulation of \
-         StarCraft micromanagement. Every number on this page comes from <code>{}</code>, version {}. Of {} claims, {held} hold in \
-         these runs and {} do not.</p>\n",
+         StarCraft micromanagement. Every number on this page comes from <code>{}</code>, version {}. Of {} claims, {} hold in \
+         these runs, {} do not, and {} are not tested by them.</p>\n",
         escaped(command),
         escaped(CODE),
         claims.len(),
-        claims.len() - held,
+        count(Verdict::Holds),
+        count(Verdict::DoesNotHold),
+        count(Verdict::NotTested),
     );
     body +=
         "<table><thead><tr><th>figure</th><th>claim</th><th>verdict</th></tr></thead>\n<tbody>\n";
@@ -90,17 +98,17 @@ impl Section<'_> {
 }
 
 fn badge(claim: &Claim) -> &'static str {
-    if claim.holds {
-        "<b class=\"holds\">holds</b>"
-    } else {
-        "<b class=\"fails\">does not hold</b>"
+    match claim.verdict {
+        Verdict::Holds => "<b class=\"holds\">holds</b>",
+        Verdict::DoesNotHold => "<b class=\"fails\">does not hold</b>",
+        Verdict::NotTested => "<b class=\"open\">not tested</b>",
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plot::{Axis, Corner, LineChart};
+    use crate::plot::{Axis, LineChart};
 
     fn chart() -> LineChart {
         let axis = || Axis {
@@ -113,19 +121,18 @@ mod tests {
             x_axis: axis(),
             y_axis: axis(),
             series: Vec::new(),
-            legend: Corner::LowerRight,
         }
     }
 
     #[test]
     fn the_page_holds_everything_and_asks_for_nothing_else() {
-        let claim = |holds| Claim {
+        let claim = |verdict| Claim {
             claim: "a < b".into(),
             source: ClaimSource::Paper,
-            holds,
+            verdict,
             evidence: "\"1\" & 2".into(),
         };
-        let claims = [claim(true), claim(false)];
+        let claims = [claim(Verdict::Holds), claim(Verdict::NotTested)];
         let section = Section {
             title: "Figure 0",
             charts: vec![chart().to_svg(), chart().to_svg()],
@@ -149,7 +156,7 @@ mod tests {
             "{html}"
         );
         assert!(
-            html.contains("1 hold in") && html.contains("and 1 do not"),
+            html.contains("1 hold in") && html.contains("0 do not, and 1 are not tested"),
             "{html}"
         );
         for outside in ["src=", "href=", "@import", "<script"] {

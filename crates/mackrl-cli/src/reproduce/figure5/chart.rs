@@ -4,7 +4,7 @@ use mackrl::tabular::Curve;
 use mackrl_env::matrix_game::{ObservationDistribution, Payoffs};
 
 use super::report::{Figure5Report, Quantity};
-use crate::plot::{Axis, Colour, Corner, LineChart, Mark, Point, Series};
+use crate::plot::{Axis, Colour, LineChart, Mark, Point, Series};
 
 /// The chart of `report`.
 pub(super) fn chart(report: &Figure5Report) -> LineChart {
@@ -35,7 +35,6 @@ pub(super) fn chart(report: &Figure5Report) -> LineChart {
             range: Some([0.4, 1.02]),
         },
         series: all_series(report),
-        legend: Corner::LowerRight,
     }
 }
 

@@ -4,10 +4,28 @@ use mackrl::tabular::{Learner, Run};
 use mackrl_env::matrix_game::{CommonKnowledge, ObservationDistribution};
 
 use super::findings::{EQUAL, ERRORS, Findings, NEAR, ROUNDING, mean, name, range};
-use crate::reproduce::{Claim, ClaimSource};
+use crate::reproduce::{Claim, ClaimSource, Verdict};
 
-/// Judges every claim.
+/// Runs of each learner at each point from which on claims about what is learnt are judged: with 30, two standard errors are the 95 %
+/// interval.
+const RUNS_LEAST: usize = 30;
+
+/// Judges every claim; those about what is learnt, if there are runs enough.
 pub(super) fn claims(findings: &Findings<'_>) -> Vec<Claim> {
+    let runs = findings.sweep.runs(Learner::Mackrl, 0).len();
+    let mut claims = about_learning(findings);
+    if runs < RUNS_LEAST {
+        for claim in &mut claims {
+            claim.verdict = Verdict::NotTested;
+            claim.evidence =
+                format!("Needs {RUNS_LEAST} runs of each learner at each point; there are {runs}.");
+        }
+    }
+    claims.push(optima_are_as_derived(findings));
+    claims
+}
+
+fn about_learning(findings: &Findings<'_>) -> Vec<Claim> {
     vec![
         reproduces_independent_learning(findings),
         joint_learning_ignores_private_observations(findings),
@@ -17,7 +35,6 @@ pub(super) fn claims(findings: &Findings<'_>) -> Vec<Claim> {
         delegates_in_every_run(findings),
         is_optimal(findings),
         published_points_are_met(findings),
-        optima_are_as_derived(findings),
     ]
 }
 
@@ -31,7 +48,7 @@ fn reproduces_independent_learning(findings: &Findings<'_>) -> Claim {
     Claim {
         claim: "Without common knowledge (p = 0), MACKRL reproduces the performance of independent actors".into(),
         source: ClaimSource::Paper,
-        holds,
+        verdict: Verdict::of(holds),
         evidence: format!(
             "MACKRL − IAC = {difference}; equal means within ±{EQUAL} of 0 with {ERRORS} standard errors added. {published} In {} of \
              {} runs the pair controller comes to prefer a joint action, which cannot earn more than {:.3}; the others \
@@ -59,7 +76,7 @@ fn joint_learning_ignores_private_observations(findings: &Findings<'_>) -> Claim
             "Without common knowledge, joint-action learning fails to use the private observations"
                 .into(),
         source: ClaimSource::Paper,
-        holds: ahead && shortfall < NEAR && best.jal < best.decentralised,
+        verdict: Verdict::of(ahead && shortfall < NEAR && best.jal < best.decentralised),
         evidence: format!(
             "At p = 0 JAL earns {:.3}, and no policy on common knowledge alone earns more than {:.3}; private observations \
              are worth up to {:.3}. IAC − JAL = {difference}. JAL learns what it can: it ends at most {shortfall:.3} below \
@@ -76,7 +93,7 @@ fn matches_joint_learning(findings: &Findings<'_>) -> Claim {
     Claim {
         claim: "With common knowledge always available (p = 1), MACKRL matches JAL".into(),
         source: ClaimSource::Paper,
-        holds,
+        verdict: Verdict::of(holds),
         evidence: format!(
             "MACKRL − JAL = {difference}; equal means within ±{EQUAL} of 0 with {ERRORS} standard \
              errors added. {published}"
@@ -122,7 +139,7 @@ fn outperforms_both(findings: &Findings<'_>) -> Claim {
         claim: "At intermediate probabilities (0 < p < 1), MACKRL outperforms both IAC and JAL"
             .into(),
         source: ClaimSource::Paper,
-        holds: wins == between.len(),
+        verdict: Verdict::of(wins == between.len()),
         evidence: format!(
             "It is ahead of both by more than {ERRORS} standard errors at {wins} of {} points. MACKRL − IAC at {}. MACKRL − \
              JAL at {}. {published}",
@@ -148,7 +165,7 @@ fn delegates_on_average(findings: &Findings<'_>) -> Claim {
         claim: "On average, MACKRL delegates when the common-knowledge bit is absent and acts jointly when it is present"
             .into(),
         source: ClaimSource::Paper,
-        holds: off[0] > 0.5 && on[1] < 0.5,
+        verdict: Verdict::of(off[0] > 0.5 && on[1] < 0.5),
         evidence: format!(
             "Mean probability of delegation where the state occurs, over all p: {:.3} to {:.3} with the bit off, {:.3} to \
              {:.3} with it on. The rule asks for more than half with the bit off and less than half with it on.",
@@ -162,7 +179,7 @@ fn delegates_in_every_run(findings: &Findings<'_>) -> Claim {
     Claim {
         claim: "It does so whenever the bit is absent or present, in every run".into(),
         source: ClaimSource::Paper,
-        holds: least == 1.0,
+        verdict: Verdict::of(least == 1.0),
         evidence: format!(
             "In {:.0} % to {:.0} % of the runs, depending on p, the choice between delegation and joint action is the one \
              described in every state that occurs. Where the matrix is commonly known, delegating \
@@ -186,7 +203,7 @@ fn is_optimal(findings: &Findings<'_>) -> Claim {
     Claim {
         claim: "What MACKRL learns corresponds to the optimal policy".into(),
         source: ClaimSource::Paper,
-        holds: met.len() == findings.points.len(),
+        verdict: Verdict::of(met.len() == findings.points.len()),
         evidence: format!(
             "An optimal policy delegates when the bit is off and may act jointly when it is on: the pattern described is that \
              of an optimal policy, the actions behind it often are not. The mean return is within {NEAR} of the optimum at \
@@ -241,7 +258,7 @@ fn published_points_are_met(findings: &Findings<'_>) -> Claim {
     Claim {
         claim: format!("Every published point lies within {NEAR} of ours"),
         source: ClaimSource::Reproduction,
-        holds: missed.is_empty(),
+        verdict: Verdict::of(missed.is_empty()),
         evidence: format!(
             "{compared} points of {}. Standard errors of ours reach {widest:.3}. The largest difference is {:.3}, {}.{missed}",
             findings.published.source, furthest.0, furthest.1
@@ -274,7 +291,7 @@ fn optima_are_as_derived(findings: &Findings<'_>) -> Claim {
     Claim {
         claim: format!("The best returns are exactly {formulae}"),
         source: ClaimSource::Reproduction,
-        holds: error < ROUNDING,
+        verdict: Verdict::of(error < ROUNDING),
         evidence: format!(
             "Enumeration of all deterministic policies at {} points; largest difference {error:.1e}. Whatever MACKRL gains \
              over IAC is gained in learning: it can express nothing better.",

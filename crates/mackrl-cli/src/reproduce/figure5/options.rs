@@ -2,12 +2,14 @@
 
 use std::{num::NonZeroUsize, path::PathBuf, sync::Arc, thread};
 
-use clap::{Args, ValueEnum, builder::RangedU64ValueParser};
+use clap::{Args, ValueEnum};
 use mackrl_env::matrix_game::{MatrixGameKind, ObservationDistribution, Payoffs};
 use mackrl_run::{
     config::EnvironmentConfig,
     provenance::{Choice, Judgement, Provenance},
 };
+
+use crate::args::{number, side_by_side, size};
 
 /// Reproduce Figure 5: MACKRL, independent learners and a joint learner on the matrix game.
 ///
@@ -36,16 +38,16 @@ pub(crate) struct Figure5Options {
         long,
         value_name = "N",
         default_value_t = 100,
-        value_parser = RangedU64ValueParser::<usize>::new().range(2..=1_000_000)
+        value_parser = size(2, 1_000_000)
     )]
     pub(crate) runs: usize,
 
     /// Seed of the initial logits. The same seed gives the same files, byte for byte.
-    #[arg(long, value_name = "S", default_value_t = 1)]
+    #[arg(long, value_name = "S", default_value_t = 1, value_parser = number(0, u64::MAX))]
     pub(crate) seed: u64,
 
     /// Threads to use; the result does not depend on it. [default: one for each processor]
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", value_parser = side_by_side)]
     pub(crate) threads: Option<NonZeroUsize>,
 
     /// Print the report as JSON, as in figure5.json, instead of a table.

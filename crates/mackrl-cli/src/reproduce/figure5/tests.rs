@@ -4,6 +4,7 @@ use clap::Parser;
 
 use super::*;
 use crate::reproduce::Claim;
+use crate::reproduce::Verdict;
 
 #[derive(Parser)]
 struct CommandLine {
@@ -57,7 +58,7 @@ fn the_json_has_the_documented_keys_and_lengths() {
                 claim["claim"].is_string() && claim["evidence"].is_string(),
                 "{claim}"
             );
-            assert!(claim["holds"].is_boolean(), "{claim}");
+            assert!(claim["verdict"].is_string(), "{claim}");
         }
         assert_eq!(
             serde_json::from_value::<Figure5Report>(json).unwrap(),
@@ -105,7 +106,12 @@ fn verdicts_are_those_that_the_numbers_support() {
         ("The best returns are exactly", true),
     ] {
         let claim = verdict(&report, beginning);
-        assert_eq!(claim.holds, holds, "{}: {}", claim.claim, claim.evidence);
+        let expected = Verdict::of(holds);
+        assert_eq!(
+            claim.verdict, expected,
+            "{}: {}",
+            claim.claim, claim.evidence
+        );
     }
     let first = verdict(&report, "Without common knowledge (p = 0)");
     assert!(
@@ -116,14 +122,30 @@ fn verdicts_are_those_that_the_numbers_support() {
 }
 
 #[test]
+fn few_runs_judge_nothing_that_is_learnt() {
+    let claims = report(&["--runs", "29"]).claims;
+    let (last, others) = claims.split_last().unwrap();
+    assert_eq!(
+        last.verdict,
+        Verdict::Holds,
+        "optima are computed, not learnt"
+    );
+    for claim in others {
+        assert_eq!(claim.verdict, Verdict::NotTested, "{}", claim.claim);
+        assert!(
+            claim.evidence.ends_with("there are 29."),
+            "{}",
+            claim.evidence
+        );
+    }
+}
+
+#[test]
 fn the_published_figure_was_not_made_with_the_printed_payoffs() {
     let claim = "Every published point";
     let printed = report(&["--runs", "100", "--payoffs", "printed"]);
-    assert!(
-        !verdict(&printed, claim).holds,
-        "{}",
-        verdict(&printed, claim).evidence
-    );
+    let met = verdict(&printed, claim);
+    assert_eq!(met.verdict, Verdict::DoesNotHold, "{}", met.evidence);
     let printed_iac = printed.curves.iac.mean[0] - printed.published.iac[0];
     assert!(
         printed_iac > 3.0 * printed.curves.iac.sem[0],

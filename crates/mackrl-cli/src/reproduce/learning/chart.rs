@@ -5,14 +5,12 @@ use super::{
     report::{Moment, Panel, Rate, Variant},
 };
 use crate::{
-    plot::{Axis, Colour, Corner, LineChart, Mark, Multiple, Point, Series, SmallMultiples},
+    plot::{Axis, Colour, LineChart, Mark, Multiple, Point, Series, SmallMultiples},
     reproduce::Chart,
 };
 
 /// The colours of MACKRL and of what it is compared with.
 const BOTH: [Colour; 2] = [Colour::BLUE, Colour::VERMILLION];
-/// One colour a moment, from light to dark.
-const MOMENTS: [Colour; 4] = [Colour::SKY, Colour::GREEN, Colour::BLUE, Colour::VERMILLION];
 /// Panels side by side.
 const COLUMNS: usize = 4;
 
@@ -24,20 +22,14 @@ impl Report {
             Body::Panels(panels) => {
                 let chart = |panel: &Panel| {
                     let series = win_rates(panel, &self.steps);
-                    let chart = self.lines(&panel.map, series, None, emptiest_corner(panel));
-                    (format!("{name}-{}", panel.map), chart)
+                    (
+                        format!("{name}-{}", panel.map),
+                        self.lines(&panel.map, series),
+                    )
                 };
                 panels.iter().map(chart).collect()
             }
-            Body::Moments(moments) => {
-                let series = moments.iter().zip(MOMENTS).map(rates).collect();
-                let enemies = moments.first().map_or(0, |moment| moment.rates.len() - 1);
-                let range = Some([-0.1, enemies as f64 + 0.1]);
-                vec![(
-                    name.to_owned(),
-                    self.lines("", series, range, Corner::UpperRight),
-                )]
-            }
+            Body::Moments(moments) => vec![(name.to_owned(), self.moments(moments))],
             Body::Variants(variants) => vec![(name.to_owned(), self.multiples(variants))],
         }
     }
@@ -53,21 +45,33 @@ impl Report {
         [(x, x_range), (y, Some([-0.02, 1.02]))].map(|(label, range)| Axis { label, range })
     }
 
-    fn lines(
-        &self,
-        map: &str,
-        series: Vec<Series>,
-        x_range: Option<[f64; 2]>,
-        legend: Corner,
-    ) -> Chart {
-        let [x_axis, y_axis] = self.axes(x_range);
+    fn lines(&self, map: &str, series: Vec<Series>) -> Chart {
+        let [x_axis, y_axis] = self.axes(None);
         Chart::Lines(LineChart {
             title: self.text(self.figure.title, map),
             subtitle: self.text(self.figure.subtitle, map),
             x_axis,
             y_axis,
             series,
-            legend,
+        })
+    }
+
+    /// A panel for each moment, with what was published for it.
+    fn moments(&self, moments: &[Moment]) -> Chart {
+        let panel = |moment: &Moment| Multiple {
+            title: moment.when(),
+            note: moment.when_published(),
+            series: rates(moment),
+        };
+        let enemies = moments.first().map_or(0, |moment| moment.rates.len() - 1);
+        let [x_axis, y_axis] = self.axes(Some([-0.1, enemies as f64 + 0.1]));
+        Chart::Multiples(SmallMultiples {
+            title: self.text(self.figure.title, ""),
+            subtitle: self.text(self.figure.subtitle, ""),
+            x_axis,
+            y_axis,
+            columns: COLUMNS,
+            panels: moments.iter().map(panel).collect(),
         })
     }
 
@@ -121,31 +125,41 @@ pub(crate) fn win_rates(panel: &Panel, steps: &[u64]) -> Vec<Series> {
             .collect(),
     };
     let [mackrl, central_v] = BOTH;
-    vec![
+    let mut series = vec![
         learned("Central-V", central_v, &panel.central_v),
         learned("MACKRL", mackrl, &panel.mackrl),
-        rings(None, central_v, &published.central_v),
-        rings(None, mackrl, &published.mackrl),
-        rings(Some("published 2018, StarCraft II"), Colour::GREY, &[]),
-    ]
-}
-
-/// Curves that end high leave room below, others above where they begin.
-pub(crate) fn emptiest_corner(panel: &Panel) -> Corner {
-    let ends = [&panel.mackrl, &panel.central_v].map(|curve| curve.mean.last().copied());
-    if ends.into_iter().flatten().all(|end| end > 0.5) {
-        Corner::LowerRight
-    } else {
-        Corner::UpperLeft
+    ];
+    if published.steps[0] <= last {
+        series.extend([
+            rings(None, central_v, &published.central_v),
+            rings(None, mackrl, &published.mackrl),
+            rings(Some("published 2018, StarCraft II"), Colour::GREY, &[]),
+        ]);
     }
+    series
 }
 
-fn rates((moment, colour): (&Moment, Colour)) -> Series {
+/// Ours, and what was published.
+fn rates(moment: &Moment) -> Vec<Series> {
     let point = |(enemies, rate): (usize, &Rate)| {
         Some(Point::with_error(enemies as f64, rate.mean?, rate.sem?))
     };
     let points = moment.rates.iter().enumerate().filter_map(point);
-    line(moment.when(), colour, points.collect())
+    let ours = line("MACKRL".to_owned(), BOTH[0], points.collect());
+    let published = published_rates(moment.published);
+    std::iter::once(ours).chain(published).collect()
+}
+
+/// Published rates by the number of commonly known enemies: rings on a dashed line.
+pub(crate) fn published_rates(rates: &[f64]) -> [Series; 2] {
+    [(None, Mark::Dashes), (Some("published 2018"), Mark::Rings)].map(|(name, mark)| Series {
+        name: name.map(str::to_owned),
+        colour: BOTH[1],
+        mark,
+        points: (rates.iter().enumerate())
+            .map(|(enemies, &rate)| Point::exact(enemies as f64, rate))
+            .collect(),
+    })
 }
 
 fn line(name: String, colour: Colour, points: Vec<Point>) -> Series {

@@ -1,6 +1,6 @@
 //! Means over seeds.
 
-use mackrl::statistics::mean_and_standard_error;
+use mackrl::statistics::{mean_and_standard_error, student_factor};
 use serde::{Deserialize, Serialize};
 
 use crate::plot::Point;
@@ -23,6 +23,8 @@ pub(crate) struct Difference {
     pub(crate) mean: f64,
     /// Standard error of the difference (Welch).
     pub(crate) error: f64,
+    /// Degrees of freedom of that error (Welch and Satterthwaite).
+    degrees: f64,
 }
 
 impl Curve {
@@ -58,26 +60,48 @@ impl Difference {
     /// Of the means of two samples.
     #[must_use]
     pub(crate) fn between(first: &[f64], second: &[f64]) -> Self {
-        let (first, second) = (
-            mean_and_standard_error(first),
-            mean_and_standard_error(second),
-        );
+        let [one, other] = [first, second].map(mean_and_standard_error);
+        let error = one.1.hypot(other.1);
+        let share = |(_, error): (f64, f64), sample: &[f64]| {
+            error.powi(4) / (sample.len().max(2) - 1) as f64
+        };
+        let shares = share(one, first) + share(other, second);
         Self {
-            mean: first.0 - second.0,
-            error: first.1.hypot(second.1),
+            mean: one.0 - other.0,
+            error,
+            // Without any spread there is no error to be uncertain about.
+            degrees: if shares > 0.0 {
+                error.powi(4) / shares
+            } else {
+                1.0
+            },
         }
     }
 
-    /// Whether the first mean is greater by more than two standard errors.
+    /// Its 95 % interval, by Student's t.
+    #[must_use]
+    pub(crate) fn interval(self) -> [f64; 2] {
+        let half = student_factor(self.degrees) * self.error;
+        [self.mean - half, self.mean + half]
+    }
+
+    /// Whether the first mean is greater: whether the interval lies above 0.
     #[must_use]
     pub(crate) fn is_ahead(self) -> bool {
-        self.mean > 2.0 * self.error
+        self.interval()[0] > 0.0
+    }
+
+    /// Whether the first mean is less: whether the interval lies below 0.
+    #[must_use]
+    pub(crate) fn is_behind(self) -> bool {
+        self.interval()[1] < 0.0
     }
 }
 
 impl std::fmt::Display for Difference {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(formatter, "{:+.3} ± {:.3}", self.mean, self.error)
+        let [low, high] = self.interval();
+        write!(formatter, "{:+.3} [{low:+.3}, {high:+.3}]", self.mean)
     }
 }
 
@@ -95,10 +119,17 @@ mod tests {
     }
 
     #[test]
-    fn ahead_means_by_two_standard_errors_of_the_difference() {
+    fn ahead_means_by_the_whole_interval_of_the_difference() {
         let close = Difference::between(&[1.0, 3.0], &[0.0, 2.0]);
         assert!((close.mean - 1.0).abs() < 1e-12 && (close.error - 2.0_f64.sqrt()).abs() < 1e-12);
         assert!(!close.is_ahead());
+        // 5 is 3.5 standard errors, and of two runs each that is not enough: the factor for 2 degrees of freedom is 4.3.
+        let two = Difference::between(&[5.0, 7.0], &[0.0, 2.0]);
+        assert!((two.degrees - 2.0).abs() < 1e-9, "{two:?}");
+        assert!(!two.is_ahead(), "{two}");
+        let five = Difference::between(&[5.0, 7.0, 5.0, 7.0, 6.0], &[0.0, 2.0, 0.0, 2.0, 1.0]);
+        assert!(five.is_ahead(), "{five}");
         assert!(Difference::between(&[9.0, 11.0], &[0.0, 2.0]).is_ahead());
+        assert!(Difference::between(&[1.0, 1.0], &[0.5, 0.5]).is_ahead());
     }
 }

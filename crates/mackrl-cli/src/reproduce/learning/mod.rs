@@ -23,7 +23,7 @@ use mackrl_run::recorded::TrainingRun;
 use serde::Serialize;
 
 use super::{make_folder, save};
-pub(crate) use chart::{emptiest_corner, win_rates};
+pub(crate) use chart::{published_rates, win_rates};
 pub(crate) use curve::{Curve, Difference};
 pub(crate) use options::LearningOptions;
 #[cfg(test)]
@@ -133,8 +133,12 @@ impl Figure {
     /// The report of runs of which each cell has as many.
     #[cfg(test)]
     pub(crate) fn report(&'static self, map: Option<&str>, runs: &[TrainingRun]) -> Report {
-        let options = LearningOptions::default();
-        let cells = self.cells(&options, map).unwrap();
+        let cells = self.cells(&LearningOptions::default(), map).unwrap();
+        let options = LearningOptions {
+            seeds: (runs.len() / cells.len()) as u64,
+            steps: 1_000_000,
+            ..LearningOptions::default()
+        };
         Report::new(self, &options, map, &cells, runs)
     }
 }

@@ -2,7 +2,9 @@
 
 use std::{num::NonZeroUsize, path::PathBuf, thread};
 
-use clap::{Args, builder::RangedU64ValueParser};
+use clap::Args;
+
+use crate::args::{number, side_by_side};
 
 /// Options that the figures of learning share.
 #[derive(Debug, Clone, Args)]
@@ -23,7 +25,7 @@ pub(crate) struct LearningOptions {
         long,
         value_name = "N",
         default_value_t = 10,
-        value_parser = RangedU64ValueParser::<u64>::new().range(2..=1_000)
+        value_parser = number(2, 1_000)
     )]
     pub(crate) seeds: u64,
 
@@ -32,7 +34,7 @@ pub(crate) struct LearningOptions {
         long,
         value_name = "N",
         default_value_t = 2_500_000,
-        value_parser = RangedU64ValueParser::<u64>::new().range(1_000..=1_000_000_000)
+        value_parser = number(1_000, 1_000_000_000)
     )]
     pub(crate) steps: u64,
 
@@ -41,7 +43,7 @@ pub(crate) struct LearningOptions {
         long,
         value_name = "N",
         default_value_t = 25_000,
-        value_parser = RangedU64ValueParser::<u64>::new().range(1_000..=1_000_000_000)
+        value_parser = number(1_000, 1_000_000_000)
     )]
     pub(crate) interval: u64,
 
@@ -50,11 +52,11 @@ pub(crate) struct LearningOptions {
     pub(crate) quick: bool,
 
     /// Take runs together that were computed by different versions of simulator or learning; the report names them.
-    #[arg(long)]
-    pub(crate) any_code: bool,
+    #[arg(long, alias = "any-code")]
+    pub(crate) mix: bool,
 
     /// Runs side by side, each on one thread; changes no result. [default: one for each processor]
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", value_parser = side_by_side)]
     pub(crate) jobs: Option<NonZeroUsize>,
 
     /// Print the report as JSON instead of a table.
@@ -107,7 +109,7 @@ impl Default for LearningOptions {
             steps: 1_000,
             interval: 1_000,
             quick: false,
-            any_code: false,
+            mix: false,
             jobs: None,
             json: false,
         }

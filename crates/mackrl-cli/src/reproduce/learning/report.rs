@@ -82,6 +82,9 @@ pub(crate) struct Moment {
     pub(crate) rates: Vec<Rate>,
     /// The published rates at this share of training.
     pub(crate) published: &'static [f64],
+    /// When these were published for, in steps of the paper's training.
+    #[serde(skip)]
+    steps_published: u64,
 }
 
 /// Published delegation: environment steps, of 2.5 million, and the rates by the number of commonly known enemies, from 0.
@@ -162,7 +165,7 @@ impl Report {
             seeds: options.seeds,
             steps: options.steps_of(tests),
             claims: (figure.claims.iter())
-                .map(|statement| statement.judge(&groups, &body))
+                .map(|statement| statement.judge(&groups, &body, options.steps))
                 .collect(),
             body,
         }
@@ -215,6 +218,7 @@ impl Moment {
                 .map(|enemies| Rate::new(runs, interval, enemies))
                 .collect(),
             published,
+            steps_published: *steps,
         }
     }
 
@@ -223,6 +227,14 @@ impl Moment {
         match self.steps {
             0 => "in the first batch".to_owned(),
             steps => format!("after {} k steps", steps / 1_000),
+        }
+    }
+
+    /// When the published rates are from, in words.
+    pub(super) fn when_published(&self) -> String {
+        match self.steps_published {
+            0 => "published: after 400 steps".to_owned(),
+            steps => format!("published: after {} k steps", steps / 1_000),
         }
     }
 }
@@ -269,7 +281,7 @@ impl Variant {
 
 impl Versus {
     fn new(own: &[f64], mackrl: &[f64]) -> Self {
-        let Difference { mean, error } = Difference::between(own, mackrl);
+        let Difference { mean, error, .. } = Difference::between(own, mackrl);
         let both = [own.to_vec(), mackrl.to_vec()];
         Self {
             difference: mean,

@@ -7,12 +7,14 @@ use super::{
     Difference,
     report::{Body, Group},
 };
-use crate::reproduce::{Claim, ClaimSource, interval, number};
+use crate::reproduce::{Claim, ClaimSource, Verdict, interval, number};
 
 /// Share of the tests at the beginning of training that "initially" means.
 const INITIAL_SHARE: f64 = 0.1;
 /// A million of the paper's 2.5 million steps.
 const MIDDLE_SHARE: f64 = 0.4;
+/// How far two learners may lie apart and still be equal, in shares of battles won.
+const EQUAL: f64 = 0.15;
 /// MACKRL and Central-V, by the names of their arms.
 const BOTH: [&str; 2] = ["mackrl", "central-v"];
 
@@ -25,6 +27,8 @@ pub(crate) struct Statement {
     pub(crate) source: ClaimSource,
     /// Of which map of the figure, from 0.
     pub(crate) map: usize,
+    /// Seeds of each learner, and environment steps of a run, without which it is not tested.
+    pub(crate) needs: (usize, u64),
     /// When it holds.
     pub(crate) rule: Rule,
     /// What there is to say beside the evidence.
@@ -36,9 +40,9 @@ pub(crate) struct Statement {
 pub(crate) enum Rule {
     /// The final means of MACKRL and Central-V are like this.
     Ends(fn(f64, f64) -> bool),
-    /// The first scores higher than the second, by more than two standard errors.
+    /// The first scores higher than the second: the 95 % interval of the difference, by Student's t, lies above 0.
     Ahead(Score, [&'static str; 2]),
-    /// Both end equally high: with a difference of less than two standard errors.
+    /// Both end equally high: that interval lies within 0 ± [`EQUAL`].
     Equal([&'static str; 2]),
     /// After two fifths of the training, the interval of MACKRL is above that of Central-V.
     Apart,
@@ -100,6 +104,7 @@ impl Statement {
         claim: "",
         source: ClaimSource::Paper,
         map: 0,
+        needs: (5, 1_000_000),
         rule: Rule::Apart,
         remark: "",
     };
@@ -109,13 +114,25 @@ impl Statement {
         ..Self::PAPER
     };
 
-    /// The verdict.
-    pub(super) fn judge(&self, groups: &[Group<'_>], body: &Body) -> Claim {
-        let (holds, evidence) = self.rule.apply(|names| self.arms(names, groups), body);
+    /// The verdict, of runs of `steps` environment steps.
+    pub(super) fn judge(&self, groups: &[Group<'_>], body: &Body, steps: u64) -> Claim {
+        let (seeds_needed, steps_needed) = self.needs;
+        let seeds = groups.iter().map(|group| group.runs.len()).min();
+        let seeds = seeds.unwrap_or_default();
+        let (verdict, evidence) = if seeds >= seeds_needed && steps >= steps_needed {
+            let (holds, evidence) = self.rule.apply(|names| self.arms(names, groups), body);
+            (Verdict::of(holds), evidence)
+        } else {
+            let evidence = format!(
+                "Needs {seeds_needed} seeds of each learner and {steps_needed} environment steps; there are {seeds} seeds of {steps} \
+                 steps."
+            );
+            (Verdict::NotTested, evidence)
+        };
         Claim {
             claim: self.claim.to_owned(),
             source: self.source,
-            holds,
+            verdict,
             evidence: format!("{evidence} {}", self.remark).trim_end().to_owned(),
         }
     }
@@ -160,14 +177,17 @@ impl Rule {
                 let (difference, evidence) = compared(*score, *names);
                 (
                     difference.is_ahead(),
-                    evidence + "; ahead means by more than 2 standard errors.",
+                    evidence + "; ahead means that the 95 % interval lies above 0.",
                 )
             }
             Self::Equal(names) => {
                 let (difference, evidence) = compared(Score::Last, *names);
+                let [low, high] = difference.interval();
                 (
-                    difference.mean.abs() <= 2.0 * difference.error,
-                    evidence + "; equal means by less than 2 standard errors.",
+                    low > -EQUAL && high < EQUAL,
+                    format!(
+                        "{evidence}; equal means that the 95 % interval lies within ± {EQUAL}."
+                    ),
                 )
             }
             Self::Apart => {

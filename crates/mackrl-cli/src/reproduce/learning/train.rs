@@ -37,7 +37,7 @@ pub(super) fn train_all(
         .map(|job| job.load(options))
         .collect::<anyhow::Result<_>>()?;
     let missing: Vec<usize> = (0..jobs.len()).filter(|&job| runs[job].is_none()).collect();
-    if !options.any_code {
+    if !options.mix {
         check_versions(&runs)?;
     }
     let entries: Vec<Entry> = (missing.iter())

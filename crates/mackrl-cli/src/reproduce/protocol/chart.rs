@@ -9,7 +9,7 @@ use crate::{
     plot::{Axis, Colour, LineChart, Mark, Multiple, Point, Series, SmallMultiples},
     reproduce::{
         Chart, figure6,
-        learning::{Curve, Curves, Panel, Published, emptiest_corner, win_rates},
+        learning::{Curve, Curves, Panel, Published, published_rates, win_rates},
     },
 };
 
@@ -57,7 +57,6 @@ fn win_rates_of(cells: [&Cell; 2], published: &'static Published) -> Chart {
         subtitle: figure6::FIGURE.subtitle.to_owned(),
         x_axis: axis(figure6::FIGURE.axes[0], None),
         y_axis: axis(figure6::FIGURE.axes[1], Some([-0.02, 1.02])),
-        legend: emptiest_corner(&panel),
         series: win_rates(&panel, &mackrl.places()),
     })
 }
@@ -100,36 +99,22 @@ fn series(moment: &Moment) -> Vec<Series> {
             .filter_map(|(enemies, rate)| Some(Point::exact(enemies as f64, (*rate)?)))
             .collect()
     };
-    let of = |name: Option<&str>, colour, mark, points| Series {
+    let of = |name: Option<&str>, colour, points| Series {
         name: name.map(str::to_owned),
         colour,
-        mark,
+        mark: Mark::Line,
         points,
     };
     let runs = moment.runs.iter().enumerate().map(|(number, (_, rates))| {
         let name = (number == 0).then_some("each run");
-        of(name, Colour::GREY, Mark::Line, points(rates))
+        of(name, Colour::GREY, points(rates))
     });
-    let published: Vec<Option<f64>> = moment.published.iter().copied().map(Some).collect();
-    let rest = [
-        of(
-            Some("share of the cases"),
-            Colour::GREEN,
-            Mark::Line,
-            points(&moment.cases),
-        ),
-        of(
-            Some("published 2018"),
-            Colour::VERMILLION,
-            Mark::Rings,
-            points(&published),
-        ),
-        of(
-            Some("mean of the runs"),
-            Colour::BLUE,
-            Mark::Line,
-            points(&moment.mean),
-        ),
+    let ours = [
+        ("share of the cases", Colour::GREEN, &moment.cases),
+        ("mean of the runs", Colour::BLUE, &moment.mean),
     ];
-    runs.chain(rest).collect()
+    let ours = ours.map(|(name, colour, rates)| of(Some(name), colour, points(rates)));
+    (runs.chain(ours))
+        .chain(published_rates(moment.published))
+        .collect()
 }

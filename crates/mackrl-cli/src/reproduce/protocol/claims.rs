@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::study::{CHOICE, Cell, LEARNERS, Quantity, Study, interquartile};
-use crate::reproduce::{ClaimSource, interval};
+use crate::reproduce::{ClaimSource, Verdict, interval};
 
 /// How far below "level" may lie and still be level, in shares of battles won.
 const LEVEL: f64 = 0.05;
@@ -47,14 +47,6 @@ enum Rule {
 pub(super) struct Judgement {
     pub(super) verdict: Verdict,
     pub(super) evidence: String,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub(super) enum Verdict {
-    Holds,
-    DoesNotHold,
-    NotTested,
 }
 
 const MACKRL: [&str; 2] = [LEARNERS[0], ""];

@@ -22,7 +22,7 @@ use mackrl_run::{
 use serde::Serialize;
 
 use self::{
-    claims::{ABLATIONS, CLAIMS, Judgement, Statement, Verdict},
+    claims::{ABLATIONS, CLAIMS, Judgement, Statement},
     delegation::Delegation,
     study::{Cell, LEARNERS, Levels, Quantity, Study},
 };
@@ -49,8 +49,8 @@ pub(crate) struct ProtocolOptions {
     pub(crate) runs: Option<PathBuf>,
 
     /// Take runs together that were computed by different versions of simulator or learning; the report names them
-    #[arg(long)]
-    pub(crate) any_code: bool,
+    #[arg(long, alias = "any-code")]
+    pub(crate) mix: bool,
 
     /// Print the report as JSON instead of text
     #[arg(long)]
@@ -114,7 +114,7 @@ struct JudgedClaim {
 /// If there is no plan, a plan or a run cannot be read, or a file cannot be written; [`Failure::OtherVersions`].
 pub(crate) fn run(options: &ProtocolOptions) -> anyhow::Result<ProtocolReport> {
     let study = Study::read(&options.folder, options.runs.as_deref())?;
-    if !options.any_code {
+    if !options.mix {
         check_versions(&study)?;
     }
     let report = ProtocolReport::new(&study);

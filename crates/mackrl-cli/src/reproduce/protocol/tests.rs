@@ -3,6 +3,7 @@ use std::fs;
 use mackrl_run::recorded::KEPT;
 
 use super::*;
+use crate::reproduce::Verdict;
 
 const PLAN: &str = r#"
 preset = "paper-code"
@@ -46,7 +47,7 @@ fn report(folder: &tempfile::TempDir) -> ProtocolReport {
     let options = ProtocolOptions {
         folder: folder.path().to_owned(),
         runs: Some(folder.path().join("nowhere")),
-        any_code: false,
+        mix: false,
         json: false,
     };
     run(&options).unwrap()

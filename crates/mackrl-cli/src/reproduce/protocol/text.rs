@@ -2,7 +2,7 @@
 
 use std::fmt::{Display, Formatter, Result};
 
-use super::{CellReport, ProtocolReport, Verdict, delegation::Moment, study::Quantity};
+use super::{CellReport, ProtocolReport, delegation::Moment, study::Quantity};
 use crate::{
     output,
     reproduce::{claim::write_verdict, interval, number},
@@ -34,11 +34,7 @@ impl Display for ProtocolReport {
             };
             writeln!(out, "\nVerdicts for {}{mark}", judged.configuration)?;
             for claim in &judged.claims {
-                let verdict = match claim.judgement.verdict {
-                    Verdict::Holds => "holds",
-                    Verdict::DoesNotHold => "does not hold",
-                    Verdict::NotTested => "not tested",
-                };
+                let verdict = claim.judgement.verdict;
                 let texts = [&*claim.claim, &*claim.judgement.evidence];
                 write_verdict(out, verdict, claim.source, texts)?;
             }

@@ -3,6 +3,7 @@
 //! The runs are those of a sweep: finished ones are kept, unfinished ones go on. What a team is worth stands in its `run.json`: how
 //! its last and its best weights play in battles that neither training nor tests have seen.
 
+mod card;
 mod report;
 
 use std::{
@@ -22,21 +23,25 @@ use mackrl_run::{
     sweep::Entry,
 };
 
-use super::{make_folder, page};
+use super::{make_folder, page, write};
 use crate::{
     commands::{resume::make_all, sweep::expect_all},
     failure::Failure,
+    replay::Opened,
     signals,
 };
 pub(crate) use report::Report;
+use report::Team;
 
 /// The maps, and for how many environment steps a team learns there.
-const MAPS: [(&str, u64); 8] = [
+const MAPS: [(&str, u64); 10] = [
     ("3m", 300_000),
     ("8m", 1_000_000),
     ("2s3z", 1_000_000),
     ("3s5z", 2_000_000),
     ("5m_vs_6m", 2_000_000),
+    ("3s_vs_3z", 2_000_000),
+    ("so_many_baneling", 2_000_000),
     ("1c3s5z", 2_000_000),
     ("MMM", 3_000_000),
     ("MMM2", 3_000_000),
@@ -45,27 +50,30 @@ const MAPS: [(&str, u64); 8] = [
 const TESTS: u64 = 30;
 /// Episodes that are recorded of each published team.
 const REPLAYS: u64 = 2;
+/// The page that shows the first of them.
+const BATTLE: &str = "battle.html";
 /// Between these marks stands the table of a page.
 const MARKS: &str = "zoo";
 
-/// Train a team for each of eight maps with the default preset, and write the table of what they win
+/// Train a team for each of ten maps with the default preset, and write the table of what they win
 ///
 /// A run that is finished in the folder is not repeated and an unfinished one goes on, so the command can be stopped and given
 /// again. Each team is judged in battles that neither training nor tests have seen.
 ///
 /// Prints the table and writes it as zoo.json. --page fills it into a page, between the lines `<!-- zoo: begin -->` and
-/// `<!-- zoo: end -->`. --publish copies what is worth keeping of each run: configuration, record, metrics, last and best weights,
-/// and two battles of the best team as replays. A published team is a run folder: `mackrl evaluate zoo/3m --checkpoint best`.
+/// `<!-- zoo: end -->`. --publish copies what is worth keeping of each run: configuration, record, metrics, last and best weights;
+/// with two battles of the best team as replays, one of them as a page for any browser, and a card that says what the team wins. A
+/// published team is a run folder: `mackrl evaluate zoo/3m --checkpoint best`.
 ///
 /// Examples: mackrl reproduce zoo --page docs/zoo.md; mackrl reproduce zoo --maps 3m,2s3z --publish zoo
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ZooOptions {
-    /// Maps to learn on, separated by commas [default: `3m,8m,2s3z,3s5z,5m_vs_6m,1c3s5z,MMM,MMM2`]
+    /// Maps to learn on, separated by commas [default: `3m,8m,2s3z,3s5z,5m_vs_6m,3s_vs_3z,so_many_baneling,1c3s5z,MMM,MMM2`]
     #[arg(long, value_name = "MAPS", value_delimiter = ',')]
     maps: Vec<String>,
 
     /// Environment steps of every team [default: 300 000 on 3m, 3 million on MMM and MMM2, between these elsewhere]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = crate::args::number(1, crate::args::MOST))]
     steps: Option<u64>,
 
     /// Seed of every team
@@ -89,7 +97,7 @@ pub(crate) struct ZooOptions {
     set: Vec<String>,
 
     /// Runs side by side, each on one thread; changes no result [default: one for each processor]
-    #[arg(long, value_name = "K")]
+    #[arg(long, value_name = "K", value_parser = crate::args::side_by_side)]
     jobs: Option<NonZeroUsize>,
 
     /// Print JSON instead of a table
@@ -163,32 +171,37 @@ pub(crate) fn run(options: &ZooOptions) -> anyhow::Result<Report> {
         page::fill(file, MARKS, &report.markdown())?;
     }
     if let Some(folder) = &options.publish {
-        for entry in &entries {
-            publish(entry, &folder.join(&entry.name))?;
+        for (entry, team) in entries.iter().zip(&report.teams) {
+            publish(entry, team, &report.versions(), &folder.join(&entry.name))?;
         }
     }
     Ok(report)
 }
 
-/// Copies what is worth keeping of a finished run, and records battles of its best team.
-fn publish(entry: &Entry, folder: &Path) -> anyhow::Result<()> {
+/// Copies what is worth keeping of a finished run, records battles of its best team, and says what it is.
+fn publish(entry: &Entry, team: &Team, versions: &str, folder: &Path) -> anyhow::Result<()> {
     let run = Run::open(&entry.folder, WhichWeights::Best)?;
     let weights = [WhichWeights::Last, WhichWeights::Best].map(WhichWeights::path);
     let records = ["config.toml", "run.json", METRICS].map(PathBuf::from);
     for file in records.iter().chain(&weights) {
         let (from, to) = (entry.folder.join(file), folder.join(file));
         if let Some(parent) = to.parent() {
-            fs::create_dir_all(parent).with_context(|| format!("creating {}", parent.display()))?;
+            make_folder(parent)?;
         }
         let content = fs::read(&from).with_context(|| format!("cannot read {}", from.display()))?;
         run_folder::replace(&to, &content)?;
     }
     let seed = run.config.run.seed;
+    let name = |episode| format!("best-seed{seed}-episode{episode}.replay.gz");
     for episode in 0..REPLAYS {
         let key = EpisodeKey::new(seed, Stream::Evaluation, episode);
         let replay = record_policy(&run.config, &run.weights, Behaviour::GREEDY, key)?;
-        let name = format!("best-seed{seed}-episode{episode}.replay.gz");
-        run_folder::keep_replay(folder, &name, &replay.to_bytes())?;
+        run_folder::keep_replay(folder, &name(episode), &replay.to_bytes())?;
+        if episode == 0 {
+            let page = Opened::of(replay)?.page(0);
+            write(folder, BATTLE, page.as_bytes())?;
+        }
     }
-    Ok(())
+    let card = card::card(team, &name(0), versions);
+    write(folder, "README.md", card.as_bytes())
 }

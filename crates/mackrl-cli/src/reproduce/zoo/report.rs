@@ -21,23 +21,24 @@ const TESTED: &str = "test_return_mean";
 pub(crate) struct Report {
     /// Where they come from.
     provenance: Vec<Provenance>,
-    teams: Vec<Team>,
+    pub(super) teams: Vec<Team>,
 }
 
 /// A team.
 #[derive(Debug, Clone, Serialize)]
-struct Team {
-    map: String,
-    algorithm: String,
+pub(super) struct Team {
+    pub(super) map: String,
+    pub(super) algorithm: String,
     /// Environment steps of its training.
-    steps_env: u64,
+    pub(super) steps_env: u64,
+    pub(super) seed: u64,
     /// Seconds that training and tests took, on one thread.
-    wall_s: f64,
+    pub(super) wall_s: f64,
     /// Bytes of its file of weights.
     weights_bytes: usize,
     /// How the weights at the end and the best in a test play.
     #[serde(flatten)]
-    judged: Teams,
+    pub(super) judged: Teams,
 }
 
 impl Report {
@@ -63,6 +64,7 @@ impl Report {
                 map: entry.name.clone(),
                 algorithm: run.algorithm(),
                 steps_env: run.config.run.steps_env,
+                seed: run.config.run.seed,
                 wall_s: wall_s.last().copied().unwrap_or_default(),
                 weights_bytes: weights.len(),
                 judged,
@@ -72,6 +74,12 @@ impl Report {
             provenance: Provenance::merged(&provenance),
             teams,
         })
+    }
+
+    /// The versions of simulator and learning that made the teams.
+    pub(super) fn versions(&self) -> String {
+        let versions = self.provenance.first().map(|one| one.versions.to_string());
+        versions.unwrap_or_default()
     }
 
     fn rows(&self) -> Vec<Vec<String>> {
@@ -92,7 +100,6 @@ impl Report {
 
     /// The table in Markdown, with what made it.
     pub(super) fn markdown(&self) -> String {
-        let versions = self.provenance.first().map(|one| one.versions.to_string());
         let episodes = self
             .teams
             .first()
@@ -101,7 +108,7 @@ impl Report {
             "{}\nMean ± standard error over {episodes} battles that neither training nor tests have seen; minutes on one thread. \
              Made by {}.\n",
             page::table(&HEADING, &self.rows()),
-            versions.unwrap_or_default()
+            self.versions()
         )
     }
 }
@@ -125,7 +132,7 @@ impl Display for Report {
 }
 
 /// "98.1 % ± 0.8"; where all battles end alike, there is no spread to estimate an error from.
-fn won(score: &Score) -> String {
+pub(super) fn won(score: &Score) -> String {
     if score.standard_error == 0.0 {
         return format!("{:.0} %", 100.0 * score.mean);
     }

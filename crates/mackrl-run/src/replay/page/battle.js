@@ -4,7 +4,7 @@ const canvas = document.getElementById("battle");
 const pen = canvas.getContext("2d");
 const still = window.matchMedia("(prefers-reduced-motion: reduce)");
 let colours = {};
-let scale = { unit: 1, width: 0, height: 0 };
+let scale = { unit: 1, fit: 1, left: 0, top: 0, width: 0, height: 0 };
 
 function readColours() {
   const style = getComputedStyle(document.documentElement);
@@ -12,7 +12,7 @@ function readColours() {
     colours[name] = style.getPropertyValue("--" + name).trim();
 }
 
-/** The ground about everywhere that somebody ever is: [west, south, east, north]. */
+/** The ground about everywhere that a unit ever is: [west, south, east, north]. */
 const ground = (() => {
   let [west, south, east, north] = [Infinity, Infinity, -Infinity, -Infinity];
   for (const frame of data.frames) for (let i = 0; i < frame.x.length; i++) {
@@ -20,12 +20,12 @@ const ground = (() => {
     south = Math.min(south, frame.y[i]); north = Math.max(north, frame.y[i]);
   }
   const widen = (low, high, least) => {
-    const middle = (low + high) / 2, half = Math.max(high - low + 5, least) / 2;
+    const middle = (low + high) / 2, half = Math.max(high - low + 4, least) / 2;
     const first = Math.max(0, Math.min(middle - half, data.edge - 2 * half));
     return [first, Math.min(data.edge, first + 2 * half)];
   };
-  [west, east] = widen(west, east, 18);
-  [south, north] = widen(south, north, 11);
+  [west, east] = widen(west, east, 13);
+  [south, north] = widen(south, north, 7);
   return { west, south, east, north };
 })();
 
@@ -37,12 +37,23 @@ function resize() {
   canvas.width = Math.round(width * dots);
   canvas.height = Math.round(height * dots);
   canvas.style.height = height + "px";
-  const side = (width - unit * (ground.east - ground.west)) / 2;
-  scale = { unit, width, height, dots, side };
+  const left = (width - unit * (ground.east - ground.west)) / 2;
+  scale = { unit, fit: unit, left, top: 0, width, height, dots };
 }
 
-const toX = (x) => scale.side + (x - ground.west) * scale.unit;
-const toY = (y) => (ground.north - y) * scale.unit;
+const toX = (x) => scale.left + (x - ground.west) * scale.unit;
+const toY = (y) => scale.top + (ground.north - y) * scale.unit;
+
+/** Enlarges the picture about a point of the canvas; at its least size all of the battle is seen. */
+function zoomAt(x, y, factor) {
+  const unit = Math.min(8 * scale.fit, scale.unit * factor);
+  if (unit <= scale.fit) resize();
+  else scale = { ...scale, unit, left: x - (x - scale.left) * unit / scale.unit, top: y - (y - scale.top) * unit / scale.unit };
+}
+
+function shiftBy(right, down) {
+  if (scale.unit > scale.fit) scale = { ...scale, left: scale.left + right, top: scale.top + down };
+}
 
 /** Where an entity is at a moment between two steps. */
 function placeOf(entity, time) {
@@ -64,12 +75,11 @@ function drawGround() {
   pen.fillStyle = colours.wall;
   pen.fillRect(0, 0, scale.width, scale.height);
   pen.fillStyle = colours.ground;
-  const [firstX, lastX] = [Math.max(0, Math.floor(ground.west - scale.side / scale.unit)), Math.min(data.edge - 1, Math.floor(ground.east + scale.side / scale.unit))];
-  for (let y = Math.floor(ground.south); y <= Math.min(data.edge - 1, Math.floor(ground.north)); y++) {
-    for (let x = firstX; x <= lastX; x++) {
+  for (let y = 0; y < data.edge; y++) {
+    for (let x = 0; x < data.edge; x++) {
       if (data.walkable[y][x] !== "1") continue;
       let end = x;
-      while (end < lastX && data.walkable[y][end + 1] === "1") end++;
+      while (end < data.edge - 1 && data.walkable[y][end + 1] === "1") end++;
       pen.fillRect(toX(x), toY(y + 1), toX(end + 1) - toX(x) + 0.5, scale.unit + 0.5);
       x = end;
     }
@@ -77,8 +87,10 @@ function drawGround() {
   pen.strokeStyle = colours.grid;
   pen.lineWidth = 1;
   pen.beginPath();
-  for (let x = Math.ceil(firstX / 4) * 4; x <= lastX + 1; x += 4) { pen.moveTo(toX(x), 0); pen.lineTo(toX(x), scale.height); }
-  for (let y = Math.ceil(ground.south / 4) * 4; y <= ground.north; y += 4) { pen.moveTo(0, toY(y)); pen.lineTo(scale.width, toY(y)); }
+  for (let place = 0; place <= data.edge; place += 4) {
+    pen.moveTo(toX(place), 0); pen.lineTo(toX(place), scale.height);
+    pen.moveTo(0, toY(place)); pen.lineTo(scale.width, toY(place));
+  }
   pen.stroke();
 }
 
@@ -127,8 +139,10 @@ function drawLinks(time) {
   }
 }
 
+/** What the decision at this time makes of it: who attacks or aims at whom in the step that follows. */
 function drawShots(time) {
-  const frame = data.frames[Math.ceil(time)] || data.frames[Math.floor(time)];
+  const frame = data.frames[Math.floor(time) + 1];
+  if (!frame) return;
   for (const [from, to, fired] of frame.shots) {
     const [start, end] = [placeOf(from, time), placeOf(to, time)];
     const length = Math.hypot(end[0] - start[0], end[1] - start[1]);
@@ -178,9 +192,9 @@ function drawBody(entity, time) {
   outline(x, y, radius);
   pen.fillStyle = entity < data.agents ? colours.ally : colours.enemy; pen.fill();
   if (entity === current.entity) { outline(x, y, radius + 2); pen.strokeStyle = colours.ink; pen.lineWidth = 2; pen.stroke(); }
-  const size = Math.max(8, Math.min(20, 1.05 * radius));
+  const size = Math.max(8, Math.min(20, 1.05 * radius)) * (unit.letters.length > 1 ? 0.8 : 1);
   pen.fillStyle = "#fff"; pen.font = `600 ${size}px system-ui, sans-serif`; pen.textAlign = "center";
-  pen.fillText(unit.kind.slice(0, 1).toUpperCase(), x, y + 0.36 * size - 0.28 * radius);
+  pen.fillText(unit.letters, x, y + 0.36 * size - 0.28 * radius);
   const width = 1.5 * radius, height = Math.max(0.2 * radius, 2);
   const bar = (top, share, colour) => {
     pen.fillStyle = colours.card; pen.fillRect(x - width / 2 - 1, top - 1, width + 2, height + 2);
@@ -200,16 +214,39 @@ function drawCooldown(x, y, radius, share) {
   pen.strokeStyle = colours.faint; pen.lineWidth = 1.6; pen.stroke();
 }
 
-function drawName(entity, time) {
-  if (scale.unit < 21 && !current.group.includes(entity)) return;
-  const { name, radius: size } = data.entities[entity];
-  const [middle, centre] = placeOf(entity, time), radius = Math.max(size * scale.unit, 5);
-  const x = middle + 0.75 * radius + 1, y = centre - 0.8 * radius - 1;
-  pen.font = "600 11.5px system-ui, sans-serif"; pen.textAlign = "left";
-  pen.fillStyle = colours.card; pen.globalAlpha = 0.75;
-  pen.fillRect(x - 1.5, y - 9.5, pen.measureText(name).width + 3, 11.5);
-  pen.globalAlpha = 1; pen.fillStyle = colours.ink;
-  pen.fillText(name, x, y);
+const names = { font: "600 11.5px system-ui, sans-serif", half: 6.5, distances: [2, 9, 18], directions: [14, 10, 2, 6, 0, 8, 12, 4] };
+
+/** Each name in the first place beside its unit that is clear of all bodies and of the names before it; left out if there is none. */
+function drawNames(time) {
+  const bodies = [], taken = [];
+  data.entities.forEach((unit, entity) => {
+    if (!isAlive(Math.floor(time), entity)) return;
+    const [x, y] = placeOf(entity, time), radius = Math.max(unit.radius * scale.unit, 5);
+    bodies.push({ entity, x, y, radius, tip: 1.2533 * radius });
+  });
+  const covers = ({ entity, x, y, radius, tip }, [left, top, right, bottom]) => {
+    const aside = Math.max(left - x, x - right, 0), above = Math.max(top - y, y - bottom, 0);
+    return entity < data.agents ? Math.hypot(aside, above) < radius : aside + above < tip;
+  };
+  const overlap = (a, b) => a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
+  pen.font = names.font; pen.textAlign = "center";
+  for (const body of bodies) {
+    const name = nameOf(body.entity), half = pen.measureText(name).width / 2 + 1.5;
+    const plates = names.distances.flatMap((distance) => names.directions.map((direction) => {
+      const turn = direction * Math.PI / 8, [east, south] = [Math.cos(turn), Math.sin(turn)];
+      const edge = body.entity < data.agents ? body.radius : body.tip / (Math.abs(east) + Math.abs(south));
+      const beside = (along) => Math.max(-1, Math.min(1, 1.5 * along));
+      const x = body.x + east * (edge + distance) + beside(east) * half, y = body.y + south * (edge + distance) + beside(south) * names.half;
+      return [x - half, y - names.half, x + half, y + names.half];
+    }));
+    const plate = plates.find((plate) => !bodies.some((other) => covers(other, plate)) && !taken.some((other) => overlap(other, plate)));
+    if (!plate) continue;
+    taken.push(plate);
+    pen.fillStyle = colours.card; pen.globalAlpha = 0.75;
+    pen.fillRect(plate[0], plate[1], 2 * half, 2 * names.half);
+    pen.globalAlpha = 1; pen.fillStyle = colours.ink;
+    pen.fillText(name, plate[0] + half, plate[3] - 2.5);
+  }
 }
 
 function drawFallen(entity, time) {
@@ -229,7 +266,7 @@ function draw(time) {
   drawShots(time);
   data.entities.forEach((_, entity) => { if (isAlive(step, entity)) drawBody(entity, time); });
   drawLinks(time);
-  data.entities.forEach((_, entity) => { if (isAlive(step, entity)) drawName(entity, time); });
+  drawNames(time);
   pen.fillStyle = colours.ink;
   for (const [x, y] of data.frames[step].missiles) { circle(toX(x), toY(y), 2.6); pen.fill(); }
 }

@@ -5,7 +5,7 @@ use mackrl_env::{Action, AgentId, EntityId, Environment};
 use mackrl_skirmish::terrain::MAP_SIZE;
 use serde::Serialize;
 
-use crate::replay::{Names, Playback, Player, Replay, Step, Summary, shot};
+use crate::replay::{Names, Playback, Player, Replay, Step, Summary, living_groups, shot};
 
 /// A replay that was played again.
 pub(super) struct Shown<'a> {
@@ -38,6 +38,8 @@ pub(super) struct PageData {
 struct Entity {
     name: String,
     kind: String,
+    /// What stands for its type.
+    letters: String,
     radius: f64,
     /// Whether its type has shields.
     shield: bool,
@@ -79,6 +81,7 @@ struct Decision {
 
 #[derive(Debug, Serialize)]
 struct Partition {
+    /// Without the dead.
     groups: Vec<Vec<AgentId>>,
     probability: f64,
     posterior: f64,
@@ -169,6 +172,7 @@ impl Entity {
         Self {
             name: shown.names.entity(id),
             kind: shown.names.kind(id).to_owned(),
+            letters: shown.names.letters(id).to_owned(),
             radius: rounded(profile.radius, 3),
             shield: profile.shield > 0.0,
             heals: profile.care.is_some(),
@@ -227,9 +231,9 @@ impl Decision {
         Self {
             actions: step.actions.clone(),
             value: step.value.map(|value| rounded(value, 3)),
-            partitions: (thought.partitions.into_iter())
+            partitions: (thought.partitions.iter())
                 .map(|partition| Partition {
-                    groups: partition.groups,
+                    groups: living_groups(&thought, partition),
                     probability: rounded(partition.probability, 4),
                     posterior: rounded(partition.posterior, 4),
                 })

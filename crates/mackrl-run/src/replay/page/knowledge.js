@@ -47,7 +47,7 @@ const verb = (agents, one, many) => (agents.length === 1 ? one : many);
 
 /** One sentence: whether the group has common knowledge, and why. */
 function verdictOf(group, known) {
-  if (group.length === 0) return "Nobody is chosen.";
+  if (group.length === 0) return "No agent is chosen.";
   if (group.some((agent) => !isAlive(current.step, agent))) return "The dead know nothing, and nothing is common with them.";
   if (group.length === 1) return `${nameOf(group[0])} alone: all that it sees.`;
   if (known.unseen.length === 0) return group.length === 2
@@ -75,7 +75,7 @@ function whyOf(group, known, entity) {
   const all = others.length > 1 ? "all of them see" : `${listed(others)} sees`;
   if (known.unseen.length === 0) {
     const base = chain.length === 0 ? "" : chain.length <= 3 ? chain.join(", ") + ", and " : "All members see each other, and ";
-    return `${base}${others.length === 0 ? name + " knows of itself" : all + " " + name}. So everybody knows it, knows that everybody knows it, and so on.`;
+    return `${base}${others.length === 0 ? name + " knows of itself" : all + " " + name}. So each of them knows it, knows that each of them knows it, and so on.`;
   }
   const [who, whom] = known.unseen[0];
   return `Every member sees ${name}, but ${nameOf(who)} does not see ${nameOf(whom)}: ${nameOf(who)} cannot tell whether ${nameOf(whom)} sees ${name}, so the group cannot rely on it.`;

@@ -106,7 +106,27 @@ function start() {
   byId("forth").addEventListener("click", () => goTo(current.step + 1));
   byId("speed").addEventListener("change", () => changeSpeed(0));
   byId("fields").addEventListener("change", () => { current.fields = byId("fields").value; draw(current.time); });
+  let drag = null;
+  canvas.addEventListener("wheel", (event) => {
+    if (!event.ctrlKey) return;
+    event.preventDefault();
+    const frame = canvas.getBoundingClientRect();
+    zoomAt(event.clientX - frame.left, event.clientY - frame.top, Math.exp(-event.deltaY / 300));
+    draw(current.time);
+  }, { passive: false });
+  canvas.addEventListener("dblclick", () => { resize(); draw(current.time); });
+  canvas.addEventListener("pointerdown", (event) => { drag = { x: event.clientX, y: event.clientY, moved: false }; });
+  window.addEventListener("pointermove", (event) => {
+    if (!drag || !event.buttons || scale.unit <= scale.fit) return;
+    const [right, down] = [event.clientX - drag.x, event.clientY - drag.y];
+    if (!drag.moved && Math.hypot(right, down) < 4) return;
+    drag = { x: event.clientX, y: event.clientY, moved: true };
+    shiftBy(right, down); draw(current.time);
+  });
   canvas.addEventListener("click", (event) => {
+    const wasDragged = drag && drag.moved;
+    drag = null;
+    if (wasDragged) return;
     const frame = canvas.getBoundingClientRect();
     const { entity, pair } = hit(event.clientX - frame.left, event.clientY - frame.top);
     if (pair) choose(pair.members);
@@ -115,7 +135,8 @@ function start() {
     else { current.entity = entity; showKnowledge(); draw(current.time); }
   });
   document.addEventListener("keydown", onKey);
-  new ResizeObserver(() => { resize(); draw(current.time); }).observe(canvas.parentElement);
+  // In the next frame: a canvas that changes its height while sizes are reported would be reported again.
+  new ResizeObserver(() => requestAnimationFrame(() => { resize(); draw(current.time); })).observe(canvas.parentElement);
   buildAgents(); addPlots(); resize();
   current.step = current.time = Math.min(data.start, last);
   current.known = knowledgeOf(current.step, []);

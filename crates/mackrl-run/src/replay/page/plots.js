@@ -8,7 +8,7 @@ function svgElement(name, attributes) {
   return element;
 }
 
-/** Adds a plot of some curves: { points, style }, null where there is no number. */
+/** Adds a plot of some curves: { points, style, name }, null where there is no number. Names are shown where there are several. */
 function addPlot(title, curves, describe) {
   const numbers = curves.flatMap((curve) => curve.points).filter((y) => y !== null && Number.isFinite(y));
   if (numbers.length === 0) return;
@@ -34,7 +34,20 @@ function addPlot(title, curves, describe) {
   const box = document.createElement("div"), heading = document.createElement("h3"), output = document.createElement("output");
   box.className = "plot";
   heading.append(title, output);
-  box.append(heading, svg);
+  const part = (className, ...words) => {
+    const parts = words.map((word) => { const span = document.createElement("span"); span.append(...[word].flat()); return span; });
+    const row = document.createElement("div");
+    row.className = className;
+    row.append(...parts);
+    return row;
+  };
+  const tidy = (y) => y.toFixed(Math.abs(high) >= 10 ? 0 : Math.abs(high) >= 1 ? 1 : 2);
+  const keys = curves.filter((curve) => curve.name).map((curve) => {
+    const sample = svgElement("svg", { viewBox: "0 0 24 8", "aria-hidden": "true" });
+    sample.append(svgElement("path", { class: `curve ${curve.style}`, d: "M0 4L24 4" }));
+    return [sample, curve.name];
+  });
+  box.append(heading, part("key", ...keys), part("ends", tidy(high), tidy(low)), svg, part("steps", "0", "step", String(last)));
   document.getElementById("plots").append(box);
   svg.addEventListener("pointerdown", (event) => {
     const frame = svg.getBoundingClientRect();
@@ -63,11 +76,11 @@ function addPlots() {
     const chosen = decision.pairs.filter((pair) => pair.choice);
     return chosen.length === 0 ? null : chosen.reduce((sum, pair) => sum + pair.delegate, 0) / chosen.length;
   });
-  addPlot("Delegation", [{ points: probability, style: "thin" }, { points: delegated, style: "" }],
+  addPlot("Delegation", [{ points: probability, style: "thin", name: "their mean probability of it" }, { points: delegated, style: "", name: "share of chosen pairs that delegate" }],
     (step) => `${digits(delegated[step], 2)} of pairs, p = ${digits(probability[step], 2)}`);
   const health = (from, to) => data.frames.map((frame) => frame.life.slice(from, to).reduce((sum, life) => sum + life, 0) / Math.max(1, to - from));
   const [allies, enemies] = [health(0, data.agents), health(data.agents, data.entities.length)];
-  addPlot("Health", [{ points: allies, style: "" }, { points: enemies, style: "second" }],
+  addPlot("Health", [{ points: allies, style: "", name: "allies" }, { points: enemies, style: "second", name: "enemies" }],
     (step) => `allies ${digits(allies[step], 2)}, enemies ${digits(enemies[step], 2)}`);
 }
 

@@ -28,6 +28,19 @@ const LENGTH_MAX: usize = 1 << 20;
 const RUNS_MAX: usize = 10_000;
 /// Longest part of a run's name.
 const NAME_MAX: usize = 60;
+/// What stands at the top of a plan.
+const OWN: [&str; 10] = [
+    "out",
+    "preset",
+    "maps",
+    "algorithms",
+    "seeds",
+    "order",
+    "settings",
+    "vary",
+    "variants",
+    "on",
+];
 /// Settings that are given by lists of their own.
 const LISTED: [(&str, &str); 3] = [
     ("env.map", "maps"),
@@ -146,11 +159,14 @@ impl Plan {
             origin: origin(name, text, at),
             message,
         };
+        let leaves = parse_document(text).map_err(|error| syntax_error(error.at, error.message))?;
+        if let Some((at, message)) = misplaced(&leaves) {
+            return Err(syntax_error(at, message).into());
+        }
         let document: Document = toml::from_str(text).map_err(|error| {
             let at = error.span().map_or(0, |span| span.start);
             syntax_error(at, error.message().to_owned())
         })?;
-        let leaves = parse_document(text).map_err(|error| syntax_error(error.at, error.message))?;
         let out = out
             .or(document.out.as_deref())
             .unwrap_or(otherwise)
@@ -339,6 +355,40 @@ impl Reading<'_> {
         let origin = self.origin_of(key);
         ConfigError::Syntax { origin, message }.into()
     }
+}
+
+/// The first thing that stands at the top of a plan and is none of a plan's own words, and where it belongs.
+fn misplaced(leaves: &[Leaf]) -> Option<(usize, String)> {
+    let foreign = leaves
+        .iter()
+        .find(|leaf| !OWN.contains(&leaf.path[0].as_str()))?;
+    let word = foreign.path.join(".");
+    let last = foreign.path.last().map_or("", String::as_str);
+    let settings = registry().settings();
+    let named = |key: &str| settings.iter().any(|setting| setting.key == key);
+    let key = match &*word {
+        "steps" => Some("run.steps_env".to_owned()),
+        whole if named(whole) => Some(whole.to_owned()),
+        _ => {
+            let ending = format!(".{last}");
+            let mut keys = settings.iter().map(|setting| &setting.key);
+            keys.find(|key| key.ends_with(&ending)).cloned()
+        }
+    };
+    let listed = |key: &str| {
+        let mut listed = LISTED.iter();
+        listed.find(|(setting, _)| *setting == key)
+    };
+    let place = match (&*word, key) {
+        ("map" | "algorithm" | "seed", _) => format!("; write `{word}s`"),
+        (_, Some(key)) => match listed(&key) {
+            Some((_, list)) => format!("; write `{list}`"),
+            None => format!("; write `{key} = {}` below [settings]", foreign.value),
+        },
+        (_, None) => format!(", expected {}", OWN.join(", ")),
+    };
+    let message = format!("`{word}` is not a word of plans{place}");
+    Some((foreign.key_at, message))
 }
 
 fn origin(name: &str, text: &str, at: usize) -> Origin {

@@ -101,7 +101,23 @@ fn errors_name_line_and_column() {
     for (change, expected) in [
         (
             "maps = [\"3m\"]\nseed = 2\n",
-            "plan.toml:2:1: unknown field `seed`",
+            "plan.toml:2:1: `seed` is not a word of plans; write `seeds`",
+        ),
+        (
+            "maps = [\"3m\"]\nseeds = 1\nsteps = 60000\n",
+            "plan.toml:3:1: `steps` is not a word of plans; write `run.steps_env = 60000` below [settings]",
+        ),
+        (
+            "maps = [\"3m\"]\nseeds = 1\n[run]\nsteps_env = 60000\n",
+            "plan.toml:4:1: `run.steps_env` is not a word of plans; write `run.steps_env = 60000` below [settings]",
+        ),
+        (
+            "maps = [\"3m\"]\nseeds = 1\ngamma = 0.9\n",
+            "plan.toml:3:1: `gamma` is not a word of plans; write `algorithm.gamma = 0.9` below [settings]",
+        ),
+        (
+            "maps = [\"3m\"]\nseeds = 1\ncolour = 1\n",
+            "plan.toml:3:1: `colour` is not a word of plans, expected out, preset, maps",
         ),
         (
             "maps = [\"3m\"]\nseeds = 0\n",

@@ -173,6 +173,30 @@ impl Checkpoint {
         })
     }
 
+    /// Environment steps that had been played.
+    ///
+    /// # Errors
+    /// [`Error::Data`] if it is damaged.
+    pub(crate) fn steps_env(&self) -> Result<u64, Error> {
+        Ok(self.numbers()?.trainer.steps_env)
+    }
+
+    /// Whether it was taken before the test at the end of a run of `planned` environment steps, so that a longer run has it as well.
+    ///
+    /// # Errors
+    /// [`Error::Data`] if it is damaged.
+    pub(crate) fn is_before_end(&self, planned: u64) -> Result<bool, Error> {
+        let Counters {
+            steps_env,
+            next_test,
+            interval_steps_env,
+            ..
+        } = self.numbers()?.trainer;
+        // Once, versions of this program put that test forward in the state itself.
+        let is_untested = interval_steps_env < steps_env && next_test != steps_env;
+        Ok(steps_env < planned || is_untested)
+    }
+
     fn numbers(&self) -> Result<Numbers, Error> {
         let broken = |error| Error::Data(format!("counters of the checkpoint: {error}"));
         let Format { format } = serde_json::from_slice(&self.counters).map_err(broken)?;

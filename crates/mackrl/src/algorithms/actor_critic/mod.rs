@@ -10,7 +10,7 @@ mod settings;
 
 use mackrl_env::{EpisodeKey, Stream};
 
-pub use settings::{ActorCriticSettings, OptimiserName};
+pub use settings::ActorCriticSettings;
 
 use super::{Algorithm, AlgorithmState, StoredState, Team, state::read_actor_critic};
 use crate::{
@@ -226,7 +226,7 @@ impl Algorithm for ActorCritic {
     }
 
     fn behaviour(&self, steps_env: u64) -> Behaviour {
-        Behaviour::sampled(self.settings.exploration(steps_env))
+        Behaviour::sampled(self.settings.exploration().at(steps_env))
     }
 
     fn learn(

@@ -1,26 +1,16 @@
 //! The settings of every learner that has controllers and one central critic, and learns on policy.
 
 use mackrl_env::{
-    declare_settings, declare_words,
-    settings::{Accepts, EXACT, SettingsError, WrongSetting},
+    declare_settings,
+    settings::{Accepts, EXACT, SettingsError},
 };
 
 use crate::{
+    algorithms::shared_settings::{Exploration, OptimiserName},
     critics::{CriticMinibatch, CriticSettings},
     nn::OptimiserKind,
     objectives::{LossAverage, ReturnSettings},
 };
-
-declare_words! {
-    /// How parameters follow the gradient.
-    pub enum OptimiserName {
-        /// Adam (Kingma and Ba, 2015), as the paper says.
-        #[default]
-        Adam = "adam",
-        /// `RMSprop`, as the authors' code.
-        Rmsprop = "rmsprop",
-    }
-}
 
 declare_settings! {
     /// Sizes of the networks, how training explores (p = (1 − ε)·softmax + ε·uniform, with ε falling linearly), and how the
@@ -87,17 +77,7 @@ impl ActorCriticSettings {
     /// How parameters follow the gradient.
     #[must_use]
     pub const fn optimiser(&self) -> OptimiserKind {
-        match self.optimiser {
-            OptimiserName::Adam => OptimiserKind::Adam {
-                beta1: 0.9,
-                beta2: 0.999,
-                epsilon: self.optimiser_epsilon,
-            },
-            OptimiserName::Rmsprop => OptimiserKind::RmsProp {
-                smoothing: self.rmsprop_smoothing,
-                epsilon: self.optimiser_epsilon,
-            },
-        }
+        (self.optimiser).with(self.optimiser_epsilon, self.rmsprop_smoothing)
     }
 
     /// How the critic learns.
@@ -123,11 +103,13 @@ impl ActorCriticSettings {
         }
     }
 
-    /// ε of the bounded softmax after so many environment steps: it falls linearly.
-    #[must_use]
-    pub fn exploration(&self, steps_env: u64) -> f64 {
-        let progress = (steps_env as f64 / self.exploration_steps_env as f64).min(1.0);
-        self.exploration_start + (self.exploration_finish - self.exploration_start) * progress
+    /// How ε falls.
+    pub(super) const fn exploration(&self) -> Exploration {
+        Exploration {
+            start: self.exploration_start,
+            finish: self.exploration_finish,
+            steps_env: self.exploration_steps_env,
+        }
     }
 
     /// Checks what the range of a single setting does not say: exploration falls.
@@ -135,28 +117,7 @@ impl ActorCriticSettings {
     /// # Errors
     /// [`SettingsError::AtOdds`] if it rises.
     pub fn check(&self) -> Result<(), SettingsError> {
-        let (start, finish) = (self.exploration_start, self.exploration_finish);
-        if finish <= start {
-            return Ok(());
-        }
-        let wrong = |name: &str, found: f64, expected| WrongSetting {
-            name: name.to_owned(),
-            found: format!("{found:?}"),
-            expected,
-            nearest: None,
-        };
-        Err(SettingsError::AtOdds(Box::new([
-            wrong(
-                "exploration_finish",
-                finish,
-                format!("at most {start:?}, which is algorithm.exploration_start"),
-            ),
-            wrong(
-                "exploration_start",
-                start,
-                format!("at least {finish:?}, which is algorithm.exploration_finish"),
-            ),
-        ])))
+        self.exploration().check()
     }
 }
 
@@ -165,31 +126,6 @@ mod tests {
     use mackrl_env::settings::Settings;
 
     use super::*;
-
-    #[test]
-    fn exploration_falls_linearly_and_then_stays() {
-        let settings = ActorCriticSettings::default();
-        for (steps, expected) in [(0, 0.5), (25_000, 0.255), (50_000, 0.01), (1_000_000, 0.01)] {
-            let found = settings.exploration(steps);
-            assert!((found - expected).abs() < 1e-12, "{steps}: {found}");
-        }
-    }
-
-    #[test]
-    fn optimisers_have_the_usual_constants_unless_others_are_asked_for() {
-        let of = |text: &str| {
-            let table = toml::from_str(text).unwrap();
-            ActorCriticSettings::read(&table).unwrap().optimiser()
-        };
-        assert_eq!(of(""), OptimiserKind::ADAM);
-        assert_eq!(of("optimiser = \"rmsprop\""), OptimiserKind::RMSPROP);
-        let own = of("optimiser = \"rmsprop\"\noptimiser_epsilon = 1e-5\nrmsprop_smoothing = 0.9");
-        let expected = OptimiserKind::RmsProp {
-            smoothing: 0.9,
-            epsilon: 1e-5,
-        };
-        assert_eq!(own, expected);
-    }
 
     #[test]
     fn exploration_that_rises_is_refused() {

@@ -322,7 +322,7 @@ impl<J: Judge> Algorithm for Agentwise<J> {
     }
 
     fn behaviour(&self, steps_env: u64) -> Behaviour {
-        Behaviour::sampled(self.settings.exploration(steps_env))
+        Behaviour::sampled(self.settings.exploration().at(steps_env))
     }
 
     fn learn(

@@ -2,11 +2,13 @@
 
 use mackrl_env::{
     declare_settings,
-    settings::{Accepts, EXACT, SettingsError, WrongSetting},
+    settings::{Accepts, EXACT, SettingsError},
 };
 
 use crate::{
-    algorithms::OptimiserName, critics::MemberCriticSettings, nn::OptimiserKind,
+    algorithms::shared_settings::{Exploration, OptimiserName},
+    critics::MemberCriticSettings,
+    nn::OptimiserKind,
     objectives::ReturnSettings,
 };
 
@@ -54,24 +56,16 @@ impl AgentwiseSettings {
     /// How parameters follow the gradient.
     #[must_use]
     pub const fn optimiser(&self) -> OptimiserKind {
-        match self.optimiser {
-            OptimiserName::Adam => OptimiserKind::Adam {
-                beta1: 0.9,
-                beta2: 0.999,
-                epsilon: self.optimiser_epsilon,
-            },
-            OptimiserName::Rmsprop => OptimiserKind::RmsProp {
-                smoothing: self.rmsprop_smoothing,
-                epsilon: self.optimiser_epsilon,
-            },
-        }
+        (self.optimiser).with(self.optimiser_epsilon, self.rmsprop_smoothing)
     }
 
-    /// ε of the bounded softmax after so many environment steps: it falls linearly.
-    #[must_use]
-    pub fn exploration(&self, steps_env: u64) -> f64 {
-        let progress = (steps_env as f64 / self.exploration_steps_env as f64).min(1.0);
-        self.exploration_start + (self.exploration_finish - self.exploration_start) * progress
+    /// How ε falls.
+    pub(super) const fn exploration(&self) -> Exploration {
+        Exploration {
+            start: self.exploration_start,
+            finish: self.exploration_finish,
+            steps_env: self.exploration_steps_env,
+        }
     }
 
     /// The critic of `members` members that reads rows of `inputs` numbers and gives rows of `outputs`.
@@ -101,27 +95,6 @@ impl AgentwiseSettings {
     /// # Errors
     /// [`SettingsError::AtOdds`] if it rises.
     pub fn check(&self) -> Result<(), SettingsError> {
-        let (start, finish) = (self.exploration_start, self.exploration_finish);
-        if finish <= start {
-            return Ok(());
-        }
-        let wrong = |name: &str, found: f64, expected| WrongSetting {
-            name: name.to_owned(),
-            found: format!("{found:?}"),
-            expected,
-            nearest: None,
-        };
-        Err(SettingsError::AtOdds(Box::new([
-            wrong(
-                "exploration_finish",
-                finish,
-                format!("at most {start:?}, which is algorithm.exploration_start"),
-            ),
-            wrong(
-                "exploration_start",
-                start,
-                format!("at least {finish:?}, which is algorithm.exploration_finish"),
-            ),
-        ])))
+        self.exploration().check()
     }
 }

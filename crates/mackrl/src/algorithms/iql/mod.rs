@@ -1,23 +1,20 @@
 //! IQL: each agent learns the value of its own actions, and takes the others for a part of the world (Tan, 1993).
 
-use mackrl_env::{
-    EnvironmentSpec, EpisodeKey,
-    settings::{Setting, Settings, SettingsError},
-};
+use mackrl_env::{EnvironmentSpec, EpisodeKey};
 
 use crate::{
-    Error, Real,
+    Real,
     algorithms::{
-        Algorithm, AlgorithmKind, Automatic, Preset, QLearner, QLearningSettings, Team,
-        q_learning::memory_that_fits,
+        Preset,
+        q_learning::{Decomposition, ValueDecomposition},
+        shared_settings::NoSettings,
     },
     critics::Mixer,
-    nn::Element,
+    nn::{Element, ParameterLayout},
 };
 
-/// The kind `iql`. All its settings are those of [`QLearningSettings`].
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Iql;
+/// The kind `iql`.
+pub type Iql = ValueDecomposition<Unmixed>;
 
 /// Leaves each member's value as it is.
 #[derive(Debug, Clone, Copy)]
@@ -26,55 +23,20 @@ pub struct Unmixed {
     pub members: usize,
 }
 
-impl AlgorithmKind for Iql {
-    fn name(&self) -> &'static str {
-        "iql"
-    }
+impl Decomposition for Unmixed {
+    const NAME: &'static str = "iql";
+    const SUMMARY: &'static str =
+        "IQL: each agent learns the value of its own actions from remembered episodes.";
+    const PRESETS: &'static [Preset] = &[Preset {
+        name: "pymarl-iql",
+        text: include_str!("presets/pymarl-iql.toml"),
+    }];
+    type Settings = NoSettings;
 
-    fn summary(&self) -> &'static str {
-        "IQL: each agent learns the value of its own actions from remembered episodes."
-    }
-
-    fn settings(&self) -> Vec<Setting> {
-        QLearningSettings::SETTINGS.to_vec()
-    }
-
-    fn defaults(&self) -> toml::Table {
-        QLearningSettings::defaults()
-    }
-
-    fn automatic(&self, table: &toml::Table, spec: &EnvironmentSpec) -> Vec<Automatic> {
-        memory_that_fits(table, spec)
-    }
-
-    fn check(
-        &self,
-        table: &toml::Table,
-        _spec: &EnvironmentSpec,
-    ) -> Result<toml::Table, SettingsError> {
-        QLearningSettings::read(table)?.check()?;
-        Ok(table.clone())
-    }
-
-    fn build(&self, table: &toml::Table, team: Team<'_>) -> Result<Box<dyn Algorithm>, Error> {
-        let settings = QLearningSettings::read(table).map_err(Error::setting)?;
-        let members = team.spec.agents;
-        Ok(Box::new(QLearner::new(settings, team, |_| Unmixed {
-            members,
-        })))
-    }
-
-    fn size(&self, table: &toml::Table, team: Team<'_>) -> Result<usize, Error> {
-        let settings = QLearningSettings::read(table).map_err(Error::setting)?;
-        let members = team.spec.agents;
-        Ok(QLearner::size(&settings, team, |_| Unmixed { members }))
-    }
-
-    fn presets(&self) -> &'static [Preset] {
-        &[Preset {
-            name: "pymarl-iql",
-            text: include_str!("presets/pymarl-iql.toml"),
-        }]
+    fn new(_: &NoSettings, spec: &EnvironmentSpec, _: &mut ParameterLayout) -> Self {
+        Self {
+            members: spec.agents,
+        }
     }
 }
 

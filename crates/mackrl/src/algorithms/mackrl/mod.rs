@@ -4,13 +4,14 @@ mod settings;
 
 use mackrl_env::{
     EnvironmentSpec,
-    settings::{Setting, Settings, SettingsError, WrongSetting},
+    settings::{Setting, SettingsError, WrongSetting},
 };
 
 use crate::{
     Error,
     algorithms::{
         ActorCritic, ActorCriticSettings, Algorithm, AlgorithmKind, Automatic, Preset, Team,
+        shared_settings::{defaults_of_both, read_both},
     },
     hierarchy::{Hierarchy, HierarchySettings, NetworkStyle},
     partition::PartitionSchedule,
@@ -26,25 +27,11 @@ impl Mackrl {
     /// The settings of the hierarchy and of its learning, which stand side by side in one table.
     ///
     /// # Errors
-    /// As [`Settings::read`].
+    /// As [`Settings::read`](mackrl_env::settings::Settings::read).
     pub fn read(
         table: &toml::Table,
     ) -> Result<(MackrlSettings, ActorCriticSettings), SettingsError> {
-        let own =
-            |name: &str| (MackrlSettings::SETTINGS.iter()).any(|setting| setting.name == name);
-        let (mut hierarchy, mut learning) = (toml::Table::new(), toml::Table::new());
-        for (name, value) in table {
-            let part = if own(name) {
-                &mut hierarchy
-            } else {
-                &mut learning
-            };
-            part.insert(name.clone(), value.clone());
-        }
-        Ok((
-            MackrlSettings::read(&hierarchy)?,
-            ActorCriticSettings::read(&learning)?,
-        ))
+        read_both(table)
     }
 }
 
@@ -62,9 +49,7 @@ impl AlgorithmKind for Mackrl {
     }
 
     fn defaults(&self) -> toml::Table {
-        let mut defaults = MackrlSettings::defaults();
-        defaults.extend(ActorCriticSettings::defaults());
-        defaults
+        defaults_of_both::<MackrlSettings, ActorCriticSettings>()
     }
 
     fn automatic(&self, table: &toml::Table, spec: &EnvironmentSpec) -> Vec<Automatic> {

@@ -36,7 +36,10 @@ pub use settings::{Groups, MackrlPpoSettings, PairMemory, PpoSettings};
 
 use crate::{
     Error,
-    algorithms::{Algorithm, AlgorithmKind, PartitionChoice, Preset, Team},
+    algorithms::{
+        Algorithm, AlgorithmKind, PartitionChoice, Preset, Team,
+        shared_settings::{defaults_of_both, read_both},
+    },
     common_knowledge::CommonKnowledgeFeatures,
     hierarchy::{Hierarchy, HierarchySettings, NetworkStyle, Weighing},
     policy::Declaration,
@@ -102,16 +105,7 @@ impl MackrlPpo {
     /// # Errors
     /// As [`Settings::read`].
     pub fn read(table: &toml::Table) -> Result<(MackrlPpoSettings, PpoSettings), SettingsError> {
-        let own =
-            |name: &str| (MackrlPpoSettings::SETTINGS.iter()).any(|setting| setting.name == name);
-        let (hierarchy, learning): (toml::Table, toml::Table) = table
-            .iter()
-            .map(|(name, value)| (name.clone(), value.clone()))
-            .partition(|(name, _)| own(name));
-        Ok((
-            MackrlPpoSettings::read(&hierarchy)?,
-            PpoSettings::read(&learning)?,
-        ))
+        read_both(table)
     }
 }
 
@@ -129,9 +123,7 @@ impl AlgorithmKind for MackrlPpo {
     }
 
     fn defaults(&self) -> toml::Table {
-        let mut defaults = MackrlPpoSettings::defaults();
-        defaults.extend(PpoSettings::defaults());
-        defaults
+        defaults_of_both::<MackrlPpoSettings, PpoSettings>()
     }
 
     fn check(

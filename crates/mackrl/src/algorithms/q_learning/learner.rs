@@ -267,7 +267,7 @@ impl<M: Mixer> Algorithm for QLearner<M> {
     }
 
     fn behaviour(&self, steps_env: u64) -> Behaviour {
-        Behaviour::sampled(self.settings.exploration(steps_env))
+        Behaviour::sampled(self.settings.exploration().at(steps_env))
     }
 
     fn learn(

@@ -15,12 +15,13 @@
 
 mod acting;
 mod choice;
+mod kind;
 mod learner;
 mod loss;
 mod minibatch;
 mod settings;
 
 pub use acting::ActionValues;
+pub use kind::{Decomposition, ValueDecomposition};
 pub use learner::QLearner;
 pub use settings::QLearningSettings;
-pub(in crate::algorithms) use settings::memory_that_fits;

@@ -2,11 +2,14 @@
 
 use mackrl_env::{
     EnvironmentSpec, declare_settings,
-    settings::{Accepts, EXACT, SettingsError, WrongSetting},
+    settings::{Accepts, EXACT, SettingsError},
 };
 
 use crate::{
-    algorithms::{Automatic, OptimiserName},
+    algorithms::{
+        Automatic,
+        shared_settings::{Exploration, OptimiserName, at_odds},
+    },
     nn::OptimiserKind,
     objectives::ReturnSettings,
 };
@@ -67,24 +70,16 @@ impl QLearningSettings {
     /// How parameters follow the gradient.
     #[must_use]
     pub const fn optimiser(&self) -> OptimiserKind {
-        match self.optimiser {
-            OptimiserName::Adam => OptimiserKind::Adam {
-                beta1: 0.9,
-                beta2: 0.999,
-                epsilon: self.optimiser_epsilon,
-            },
-            OptimiserName::Rmsprop => OptimiserKind::RmsProp {
-                smoothing: self.rmsprop_smoothing,
-                epsilon: self.optimiser_epsilon,
-            },
-        }
+        (self.optimiser).with(self.optimiser_epsilon, self.rmsprop_smoothing)
     }
 
-    /// ε after so many environment steps: it falls linearly.
-    #[must_use]
-    pub fn exploration(&self, steps_env: u64) -> f64 {
-        let progress = (steps_env as f64 / self.exploration_steps_env as f64).min(1.0);
-        self.exploration_start + (self.exploration_finish - self.exploration_start) * progress
+    /// How ε falls.
+    pub(super) const fn exploration(&self) -> Exploration {
+        Exploration {
+            start: self.exploration_start,
+            finish: self.exploration_finish,
+            steps_env: self.exploration_steps_env,
+        }
     }
 
     /// How far targets look.
@@ -100,13 +95,7 @@ impl QLearningSettings {
     /// # Errors
     /// [`SettingsError::AtOdds`] if not.
     pub fn check(&self) -> Result<(), SettingsError> {
-        let (start, finish) = (self.exploration_start, self.exploration_finish);
-        if finish > start {
-            return Err(at_odds(
-                ("exploration_finish", format!("{finish:?}")),
-                ("exploration_start", format!("{start:?}")),
-            ));
-        }
+        self.exploration().check()?;
         let (drawn, kept) = (self.minibatch_episodes, self.memory_episodes);
         if drawn > kept {
             return Err(at_odds(
@@ -119,10 +108,7 @@ impl QLearningSettings {
 }
 
 /// A smaller memory, where that of `table` would take many gigabytes in a world of these sizes.
-pub(in crate::algorithms) fn memory_that_fits(
-    table: &toml::Table,
-    spec: &EnvironmentSpec,
-) -> Vec<Automatic> {
+pub(super) fn memory_that_fits(table: &toml::Table, spec: &EnvironmentSpec) -> Vec<Automatic> {
     let numbers = spec.agents * spec.observation_size + spec.state_size;
     let steps = (spec.episode_limit as u64).saturating_add(1);
     let bytes = steps.saturating_mul((numbers * size_of::<f32>()) as u64);
@@ -141,36 +127,11 @@ pub(in crate::algorithms) fn memory_that_fits(
     }]
 }
 
-/// That the first setting is larger than the second.
-fn at_odds((larger, found): (&str, String), (smaller, other): (&str, String)) -> SettingsError {
-    let wrong = |name: &str, found: &str, expected| WrongSetting {
-        name: name.to_owned(),
-        found: found.to_owned(),
-        expected,
-        nearest: None,
-    };
-    let most = format!("at most {other}, which is algorithm.{smaller}");
-    let least = format!("at least {found}, which is algorithm.{larger}");
-    SettingsError::AtOdds(Box::new([
-        wrong(larger, &found, most),
-        wrong(smaller, &other, least),
-    ]))
-}
-
 #[cfg(test)]
 mod tests {
     use mackrl_env::settings::Settings;
 
     use super::*;
-
-    #[test]
-    fn exploration_falls_linearly_and_then_stays() {
-        let settings = QLearningSettings::default();
-        for (steps, expected) in [(0, 1.0), (25_000, 0.525), (50_000, 0.05), (1_000_000, 0.05)] {
-            let found = settings.exploration(steps);
-            assert!((found - expected).abs() < 1e-12, "{steps}: {found}");
-        }
-    }
 
     #[test]
     fn large_teams_remember_fewer_episodes_and_small_ones_what_is_asked_for() {

@@ -2,22 +2,20 @@
 
 use mackrl_env::{
     EnvironmentSpec, declare_settings,
-    settings::{Accepts, Setting, Settings, SettingsError, WrongSetting},
+    settings::{Accepts, SettingsError, WrongSetting},
 };
 
 use crate::{
-    Error,
     algorithms::{
-        Algorithm, AlgorithmKind, Automatic, Preset, QLearner, QLearningSettings, Team,
-        q_learning::memory_that_fits,
+        Preset,
+        q_learning::{Decomposition, ValueDecomposition},
     },
     critics::{Monotonic, MonotonicSizes},
     nn::ParameterLayout,
 };
 
 /// The kind `qmix`.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Qmix;
+pub type Qmix = ValueDecomposition<Monotonic>;
 
 declare_settings! {
     /// The mixer of QMIX.
@@ -31,100 +29,41 @@ declare_settings! {
     }
 }
 
-impl Qmix {
-    /// The settings of the mixer and of learning, which stand side by side in one table.
-    ///
-    /// # Errors
-    /// As [`Settings::read`].
-    pub fn read(table: &toml::Table) -> Result<(QmixSettings, QLearningSettings), SettingsError> {
-        let own = |name: &str| (QmixSettings::SETTINGS.iter()).any(|setting| setting.name == name);
-        let (mixer, learning): (toml::Table, toml::Table) = table
-            .iter()
-            .map(|(name, value)| (name.clone(), value.clone()))
-            .partition(|(name, _)| own(name));
-        Ok((
-            QmixSettings::read(&mixer)?,
-            QLearningSettings::read(&learning)?,
-        ))
-    }
-}
+impl Decomposition for Monotonic {
+    const NAME: &'static str = "qmix";
+    const SUMMARY: &'static str = "QMIX: agents' action values, mixed by weights of the state into one value of the team that rises with each.";
+    const PRESETS: &'static [Preset] = &[
+        Preset {
+            name: "pymarl-qmix",
+            text: include_str!("presets/pymarl-qmix.toml"),
+        },
+        Preset {
+            name: "pymarl2-qmix",
+            text: include_str!("presets/pymarl2-qmix.toml"),
+        },
+    ];
+    type Settings = QmixSettings;
 
-impl QmixSettings {
-    fn mixer(&self, spec: &EnvironmentSpec, layout: &mut ParameterLayout) -> Monotonic {
+    fn check(settings: &QmixSettings, spec: &EnvironmentSpec) -> Result<(), SettingsError> {
+        if spec.state_size > 0 {
+            return Ok(());
+        }
+        Err(SettingsError::Wrong(WrongSetting {
+            name: "mixing_hidden".to_owned(),
+            found: settings.mixing_hidden.to_string(),
+            expected: format!("another algorithm: {} shows no state to mix by", spec.name),
+            nearest: None,
+        }))
+    }
+
+    fn new(settings: &QmixSettings, spec: &EnvironmentSpec, layout: &mut ParameterLayout) -> Self {
         let sizes = MonotonicSizes {
             state: spec.state_size,
             members: spec.agents,
-            hidden: self.mixing_hidden,
-            hypernetwork_hidden: (self.hypernetwork_layers == 2)
-                .then_some(self.hypernetwork_hidden),
+            hidden: settings.mixing_hidden,
+            hypernetwork_hidden: (settings.hypernetwork_layers == 2)
+                .then_some(settings.hypernetwork_hidden),
         };
-        Monotonic::new(layout, sizes)
-    }
-}
-
-impl AlgorithmKind for Qmix {
-    fn name(&self) -> &'static str {
-        "qmix"
-    }
-
-    fn summary(&self) -> &'static str {
-        "QMIX: agents' action values, mixed by weights of the state into one value of the team that rises with each."
-    }
-
-    fn settings(&self) -> Vec<Setting> {
-        [QmixSettings::SETTINGS, QLearningSettings::SETTINGS].concat()
-    }
-
-    fn defaults(&self) -> toml::Table {
-        let mut defaults = QmixSettings::defaults();
-        defaults.extend(QLearningSettings::defaults());
-        defaults
-    }
-
-    fn automatic(&self, table: &toml::Table, spec: &EnvironmentSpec) -> Vec<Automatic> {
-        memory_that_fits(table, spec)
-    }
-
-    fn check(
-        &self,
-        table: &toml::Table,
-        spec: &EnvironmentSpec,
-    ) -> Result<toml::Table, SettingsError> {
-        let (settings, learning) = Self::read(table)?;
-        learning.check()?;
-        if spec.state_size == 0 {
-            return Err(SettingsError::Wrong(WrongSetting {
-                name: "mixing_hidden".to_owned(),
-                found: settings.mixing_hidden.to_string(),
-                expected: format!("another algorithm: {} shows no state to mix by", spec.name),
-                nearest: None,
-            }));
-        }
-        Ok(table.clone())
-    }
-
-    fn build(&self, table: &toml::Table, team: Team<'_>) -> Result<Box<dyn Algorithm>, Error> {
-        let (settings, learning) = Self::read(table).map_err(Error::setting)?;
-        let mixer = |layout: &mut ParameterLayout| settings.mixer(team.spec, layout);
-        Ok(Box::new(QLearner::new(learning, team, mixer)))
-    }
-
-    fn size(&self, table: &toml::Table, team: Team<'_>) -> Result<usize, Error> {
-        let (settings, learning) = Self::read(table).map_err(Error::setting)?;
-        let mixer = |layout: &mut ParameterLayout| settings.mixer(team.spec, layout);
-        Ok(QLearner::size(&learning, team, mixer))
-    }
-
-    fn presets(&self) -> &'static [Preset] {
-        &[
-            Preset {
-                name: "pymarl-qmix",
-                text: include_str!("presets/pymarl-qmix.toml"),
-            },
-            Preset {
-                name: "pymarl2-qmix",
-                text: include_str!("presets/pymarl2-qmix.toml"),
-            },
-        ]
+        Self::new(layout, sizes)
     }
 }

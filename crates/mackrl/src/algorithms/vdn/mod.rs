@@ -1,23 +1,20 @@
 //! VDN: the value of the team is the sum of the agents' (Sunehag and others, 2018).
 
-use mackrl_env::{
-    EnvironmentSpec, EpisodeKey,
-    settings::{Setting, Settings, SettingsError},
-};
+use mackrl_env::{EnvironmentSpec, EpisodeKey};
 
 use crate::{
-    Error, Real,
+    Real,
     algorithms::{
-        Algorithm, AlgorithmKind, Automatic, Preset, QLearner, QLearningSettings, Team,
-        q_learning::memory_that_fits,
+        Preset,
+        q_learning::{Decomposition, ValueDecomposition},
+        shared_settings::NoSettings,
     },
     critics::Mixer,
-    nn::Element,
+    nn::{Element, ParameterLayout},
 };
 
-/// The kind `vdn`. All its settings are those of [`QLearningSettings`].
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Vdn;
+/// The kind `vdn`.
+pub type Vdn = ValueDecomposition<Summed>;
 
 /// Adds the members' values.
 #[derive(Debug, Clone, Copy)]
@@ -26,55 +23,20 @@ pub struct Summed {
     pub members: usize,
 }
 
-impl AlgorithmKind for Vdn {
-    fn name(&self) -> &'static str {
-        "vdn"
-    }
+impl Decomposition for Summed {
+    const NAME: &'static str = "vdn";
+    const SUMMARY: &'static str =
+        "VDN: agents' action values, whose sum is learnt as the value of the team.";
+    const PRESETS: &'static [Preset] = &[Preset {
+        name: "pymarl-vdn",
+        text: include_str!("presets/pymarl-vdn.toml"),
+    }];
+    type Settings = NoSettings;
 
-    fn summary(&self) -> &'static str {
-        "VDN: agents' action values, whose sum is learnt as the value of the team."
-    }
-
-    fn settings(&self) -> Vec<Setting> {
-        QLearningSettings::SETTINGS.to_vec()
-    }
-
-    fn defaults(&self) -> toml::Table {
-        QLearningSettings::defaults()
-    }
-
-    fn automatic(&self, table: &toml::Table, spec: &EnvironmentSpec) -> Vec<Automatic> {
-        memory_that_fits(table, spec)
-    }
-
-    fn check(
-        &self,
-        table: &toml::Table,
-        _spec: &EnvironmentSpec,
-    ) -> Result<toml::Table, SettingsError> {
-        QLearningSettings::read(table)?.check()?;
-        Ok(table.clone())
-    }
-
-    fn build(&self, table: &toml::Table, team: Team<'_>) -> Result<Box<dyn Algorithm>, Error> {
-        let settings = QLearningSettings::read(table).map_err(Error::setting)?;
-        let members = team.spec.agents;
-        Ok(Box::new(QLearner::new(settings, team, |_| Summed {
-            members,
-        })))
-    }
-
-    fn size(&self, table: &toml::Table, team: Team<'_>) -> Result<usize, Error> {
-        let settings = QLearningSettings::read(table).map_err(Error::setting)?;
-        let members = team.spec.agents;
-        Ok(QLearner::size(&settings, team, |_| Summed { members }))
-    }
-
-    fn presets(&self) -> &'static [Preset] {
-        &[Preset {
-            name: "pymarl-vdn",
-            text: include_str!("presets/pymarl-vdn.toml"),
-        }]
+    fn new(_: &NoSettings, spec: &EnvironmentSpec, _: &mut ParameterLayout) -> Self {
+        Self {
+            members: spec.agents,
+        }
     }
 }
 
