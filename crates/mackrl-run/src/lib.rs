@@ -2,6 +2,27 @@
 //!
 //! The crate [`mackrl`] holds the paper and writes no file. This one brings worlds, policies and learners together
 //! ([`training`]) as a configuration ([`config`]) describes them, and records episodes that can be played again ([`replay`]).
+//!
+//! # Examples
+//! ```
+//! use mackrl_run::{
+//!     config::{ConfigBuilder, Registry},
+//!     training::Trainer,
+//! };
+//!
+//! let config = ConfigBuilder::new(&Registry::built_in())
+//!     .preset("paper")?
+//!     .set("env.map=3m")?
+//!     .set("run.steps_env=500")?
+//!     .build()?;
+//! let mut trainer = Trainer::new(&config, 1)?;
+//! while !trainer.finished() {
+//!     if let Some(row) = trainer.update()? {
+//!         println!("{:?}", row.get("test_battle_won_mean"));
+//!     }
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod apart;
 mod batch_system;
@@ -23,8 +44,3 @@ mod error;
 
 pub use error::{Result, RunError};
 pub use mackrl::{Error, NotFinite};
-
-/// Compiles and runs the examples of README.md.
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct ReadmeExamples;

@@ -47,9 +47,9 @@ fn root() -> PathBuf {
     folder.canonicalize().expect("the repository")
 }
 
-/// Every page of `docs/`, by its path in the repository.
+/// README.md and every page of `docs/`, by their paths in the repository.
 fn pages() -> Vec<String> {
-    let mut found = Vec::new();
+    let mut found = vec!["README.md".to_owned()];
     for folder in ["docs", "docs/reference"] {
         for entry in fs::read_dir(root().join(folder)).expect("a folder of pages") {
             let name = entry.expect("an entry").file_name();
