@@ -162,7 +162,8 @@ pub(crate) fn published_rates(rates: &[f64]) -> [Series; 2] {
     })
 }
 
-fn line(name: String, colour: Colour, points: Vec<Point>) -> Series {
+/// A named curve.
+pub(crate) fn line(name: String, colour: Colour, points: Vec<Point>) -> Series {
     Series {
         name: Some(name),
         colour,

@@ -23,7 +23,7 @@ use mackrl_run::recorded::TrainingRun;
 use serde::Serialize;
 
 use super::{make_folder, save};
-pub(crate) use chart::{published_rates, win_rates};
+pub(crate) use chart::{line, published_rates, win_rates};
 pub(crate) use curve::{Curve, Difference};
 pub(crate) use options::LearningOptions;
 #[cfg(test)]

@@ -2,18 +2,20 @@
 
 use super::{
     ProtocolReport, Study,
+    claims::differences,
     delegation::{Delegation, Moment},
-    study::{Cell, LEARNERS},
+    study::{CHOICE, Cell, LEARNED, LEARNERS, Quantity, interquartile},
 };
 use crate::{
     plot::{Axis, Colour, LineChart, Mark, Multiple, Point, Series, SmallMultiples},
     reproduce::{
-        Chart, figure6,
-        learning::{Curve, Curves, Panel, Published, published_rates, win_rates},
+        Chart, figure6, interval,
+        learning::{Curve, Curves, Panel, Published, line, published_rates, win_rates},
     },
 };
 
-/// Figure 6 of each map and configuration of which both learners have two runs, and Figure 7; each with the name of its files.
+/// Figure 6 of each map and configuration of which both learners have two runs, Figure 7, and the ablations of each configuration of
+/// which all have two runs; each with the name of its files.
 pub(super) fn charts(study: &Study, report: &ProtocolReport) -> Vec<(String, Chart)> {
     let Curves::Maps(published) = figure6::FIGURE.curves else {
         return Vec::new();
@@ -33,24 +35,68 @@ pub(super) fn charts(study: &Study, report: &ProtocolReport) -> Vec<(String, Cha
     if let Some(delegation) = &report.delegation {
         charts.push(("figure7".to_owned(), delegation_of(delegation)));
     }
+    for configuration in study.configurations() {
+        if let Some(chart) = ablations_of(study, &configuration) {
+            charts.push((format!("ablations-{CHOICE}-{configuration}"), chart));
+        }
+    }
     charts
 }
 
-fn win_rates_of(cells: [&Cell; 2], published: &'static Published) -> Chart {
-    let curve = |cell: &Cell| {
-        let runs: Vec<&[f64]> = cell.runs.values().map(|run| &*run.battle_won).collect();
-        Curve::of(&runs)
+/// A panel for each ablation, with MACKRL in all of them.
+fn ablations_of(study: &Study, configuration: &str) -> Option<Chart> {
+    let mackrl = study.cell(CHOICE, [LEARNED[0], configuration, LEARNED[1]])?;
+    let cells = (study.cells.iter()).filter(|cell| cell.configuration == configuration);
+    let others: Vec<&Cell> = cells.filter(|cell| cell.name() != mackrl.name()).collect();
+    let drawn = |cell: &&Cell| cell.runs.len() > 1;
+    (others.iter().chain([&mackrl]).all(drawn)).then_some(())?;
+    let series = |cell: &Cell, name: &str, colour| {
+        let points = curve(cell).points(&cell.places());
+        line(name.to_owned(), colour, points)
     };
+    let panel = |cell: &&Cell| {
+        let paired = differences(cell, mackrl, |cell| cell.of_runs(Quantity::All));
+        Multiple {
+            title: format!("{} {}", cell.learner, cell.variant),
+            note: interval(interquartile(&paired)).replace('-', "−"),
+            series: vec![
+                series(mackrl, "MACKRL", Colour::BLUE),
+                series(cell, "what the panel names", Colour::VERMILLION),
+            ],
+        }
+    };
+    Some(Chart::Multiples(SmallMultiples {
+        title: format!("What MACKRL's parts are worth on {CHOICE}, {configuration}"),
+        subtitle: format!(
+            "Greedy tests; mean of {} seeds ± one standard error. The number: over training less MACKRL, paired, with its 95 % interval",
+            mackrl.runs.len()
+        ),
+        x_axis: axis(figure6::FIGURE.axes[0], None),
+        y_axis: axis(figure6::FIGURE.axes[1], Some([-0.02, 1.02])),
+        columns: 4,
+        panels: others.iter().map(panel).collect(),
+    }))
+}
+
+fn axis(label: &str, range: Option<[f64; 2]>) -> Axis {
+    Axis {
+        label: label.to_owned(),
+        range,
+    }
+}
+
+fn curve(cell: &Cell) -> Curve {
+    let runs: Vec<&[f64]> = cell.runs.values().map(|run| &*run.battle_won).collect();
+    Curve::of(&runs)
+}
+
+fn win_rates_of(cells: [&Cell; 2], published: &'static Published) -> Chart {
     let [mackrl, central_v] = cells;
     let panel = Panel {
         map: mackrl.map.clone(),
         mackrl: curve(mackrl),
         central_v: curve(central_v),
         published,
-    };
-    let axis = |label: &str, range| Axis {
-        label: label.to_owned(),
-        range,
     };
     Chart::Lines(LineChart {
         title: format!("Battles won on {}, {}", panel.map, mackrl.configuration),
@@ -79,14 +125,8 @@ fn delegation_of(delegation: &Delegation) -> Chart {
     Chart::Multiples(SmallMultiples {
         title: "When pairs delegate, 2s3z".to_owned(),
         subtitle: "Chosen pairs with common knowledge".to_owned(),
-        x_axis: Axis {
-            label: "Enemies in the pair's common knowledge".to_owned(),
-            range: Some([-0.1, 5.1]),
-        },
-        y_axis: Axis {
-            label: "Share of pairs that delegate".to_owned(),
-            range: Some([-0.02, 1.02]),
-        },
+        x_axis: axis("Enemies in the pair's common knowledge", Some([-0.1, 5.1])),
+        y_axis: axis("Share of pairs that delegate", Some([-0.02, 1.02])),
         columns: 4,
         panels: panels.collect(),
     })

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::study::{CHOICE, Cell, LEARNERS, Quantity, Study, interquartile};
+use super::study::{CHOICE, Cell, LEARNED, LEARNERS, Quantity, Study, interquartile};
 use crate::reproduce::{ClaimSource, Verdict, interval};
 
 /// How far below "level" may lie and still be level, in shares of battles won.
@@ -51,7 +51,6 @@ pub(super) struct Judgement {
 
 const MACKRL: [&str; 2] = [LEARNERS[0], ""];
 const CENTRAL_V: [&str; 2] = [LEARNERS[1], ""];
-const LEARNED: [&str; 2] = [LEARNERS[0], "learned"];
 
 impl Statement {
     const ON_2S3Z: Self = Self {
@@ -309,7 +308,11 @@ impl Rule {
 }
 
 /// Of seeds that both cells have, a number of the first less that of the second.
-fn differences(first: &Cell, second: &Cell, of: impl Fn(&Cell) -> Vec<(u64, f64)>) -> Vec<f64> {
+pub(super) fn differences(
+    first: &Cell,
+    second: &Cell,
+    of: impl Fn(&Cell) -> Vec<(u64, f64)>,
+) -> Vec<f64> {
     let others = of(second);
     let difference = |(seed, value): (u64, f64)| {
         let (_, other) = others.iter().find(|(other, _)| *other == seed)?;

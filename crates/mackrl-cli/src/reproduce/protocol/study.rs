@@ -22,6 +22,8 @@ use crate::reproduce::write;
 const CONFIGURATIONS: [&str; 3] = ["one-sweep", "paper-figures", "gae"];
 /// Learners that are compared.
 pub(super) const LEARNERS: [&str; 2] = ["mackrl", "central-v"];
+/// MACKRL among the ablations: the learner, and how its plan calls it.
+pub(super) const LEARNED: [&str; 2] = [LEARNERS[0], "learned"];
 /// The map on which the configuration is chosen.
 pub(super) const CHOICE: &str = "2s3z";
 /// Steps on both sides of a moment whose tests are averaged: one test of 24 battles says little.

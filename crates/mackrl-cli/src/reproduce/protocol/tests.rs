@@ -1,6 +1,6 @@
 use std::fs;
 
-use mackrl_run::recorded::KEPT;
+use mackrl_run::{recorded::KEPT, sweep::Entry};
 
 use super::*;
 use crate::reproduce::Verdict;
@@ -25,17 +25,25 @@ algorithm.advantage_lambda = 0.8
 /// A folder with a plan and kept runs that win `won` of every test but the first, a thousandth more with each seed; nothing where
 /// that is nothing.
 fn folder(won: impl Fn(&str) -> Option<f64>) -> tempfile::TempDir {
+    kept(PLAN, |entry| {
+        let (kind, seed) = entry.name.split_once("-seed").unwrap();
+        let seed: f64 = seed.parse().unwrap();
+        Some(won(kind)? + (seed - 108.5) / 1000.0)
+    })
+}
+
+/// A folder with `plan` and kept runs that win `won` of every test but the first; nothing where that is nothing.
+fn kept(plan: &str, won: impl Fn(&Entry) -> Option<f64>) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("plan-2s3z.toml"), PLAN).unwrap();
+    fs::write(folder.path().join("plan-2s3z.toml"), plan).unwrap();
     fs::create_dir(folder.path().join(KEPT)).unwrap();
     for entry in plans(folder.path(), None).unwrap().remove(0).entries {
-        let (kind, seed) = entry.name.split_once("-seed").unwrap();
-        let Some(won) = won(kind) else {
+        let Some(won) = won(&entry) else {
             continue;
         };
-        let seed: f64 = seed.parse().unwrap();
-        let mut tests = vec![won + (seed - 108.5) / 1000.0; 101];
-        tests[0] = 0.0;
+        let tests = entry.config.run.steps_env / entry.config.test.interval_steps_env;
+        let later = (0..tests).map(|_| won);
+        let tests = std::iter::once(0.0).chain(later).collect();
         let run = mackrl_run::recorded::TrainingRun::new(&entry.config, tests, Vec::new());
         let file = folder.path().join(KEPT).join(entry.name + ".json");
         fs::write(file, serde_json::to_string(&run).unwrap()).unwrap();
@@ -134,5 +142,49 @@ fn the_plans_of_the_protocol_have_what_its_claims_are_about() {
                 assert!(!evidence.contains("no plan"), "{evidence}");
             }
         }
+    }
+}
+
+/// Ablations of few runs: a panel for each but MACKRL itself, with what it wins less or more than MACKRL.
+#[test]
+fn ablations_are_drawn_beside_mackrl() {
+    let plan = r#"
+preset = "paper-code"
+maps = ["2s3z"]
+algorithms = ["mackrl"]
+seeds = 2
+
+[settings]
+run.steps_env = 50000
+run.metrics_interval_steps_env = 25000
+test.interval_steps_env = 25000
+
+[variants.gae-learned]
+
+[variants.gae-always]
+algorithm.delegation = "always"
+
+[variants.gae-never]
+algorithm.delegation = "never"
+"#;
+    let folder = kept(plan, |entry| {
+        let always = entry.name.contains("always");
+        Some(if always { 0.25 } else { 0.5 })
+    });
+    let report = report(&folder);
+    assert_eq!(
+        verdicts(&report.verdicts[0]),
+        [Verdict::NotTested; 7],
+        "two runs are too few"
+    );
+    let svg = fs::read_to_string(folder.path().join("ablations-2s3z-gae.svg")).unwrap();
+    assert_eq!(svg.matches("<clipPath").count(), 2);
+    for told in [
+        "mackrl always",
+        "−0.250 [−0.250, −0.250]",
+        "mackrl never",
+        "0.000 [0.000, 0.000]",
+    ] {
+        assert!(svg.contains(told), "{told} in {svg}");
     }
 }
