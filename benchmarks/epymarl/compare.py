@@ -12,7 +12,8 @@ QMIX, one environment, an update of 32 whole episodes after every episode, Adam,
 game or of the learner, the shapes of the networks, or the optimiser differ.
 
 Short windows of both alternate, on one thread and on two. EPyMARL's processes live on and wait while others are measured; a
-window of theirs is whole episodes after the first updates. Of ours two runs of the same seed are timed, a short one that ends
+window of theirs is whole episodes after the first updates. With several threads PyTorch is measured twice, with threads that wait
+actively, as is its default, and passively: the first suffers from other load, and the faster one counts. Of ours two runs of the same seed are timed, a short one that ends
 after the first updates and a long one: their difference leaves out the start and the end. Steps a second of processor time stand
 beside, which other load on the machine changes less.
 """
@@ -38,6 +39,7 @@ PYTHON = FOLDER / "venv/bin/python"
 COMMIT = "cbc38c09588064eab978501d0f12c2cf58fa7fc2"
 MAP = "2s3z"
 NEVER = 1_000_000_000
+WAITS = ["active", "passive"]
 
 # Where EPyMARL's QMIX is not PyMARL's: no recurrence, no last action in observations and state, standardised rewards.
 THEIRS = {
@@ -86,7 +88,7 @@ def main():
     parser.add_argument("--wheel", type=Path, help="a wheel of our package, instead of building python/")
     parser.add_argument("--threads", type=int, nargs="+", default=[1, 2])
     parser.add_argument("--rounds", type=int, default=5, help="windows of each")
-    parser.add_argument("--seconds", type=float, default=10, help="length of EPyMARL's windows")
+    parser.add_argument("--seconds", type=float, default=8, help="length of EPyMARL's windows")
     parser.add_argument("--steps", type=int, default=10_000, help="environment steps of our windows")
     parser.add_argument("--before", type=int, default=2_000, help="environment steps of ours before a window")
     parser.add_argument("--json", metavar="FILE", type=Path, help="write the numbers to FILE")
@@ -129,9 +131,10 @@ def install(wheel):
 class Peer:
     """EPyMARL in a process of its own, which waits between windows."""
 
-    def __init__(self, checkout, threads, scratch):
+    def __init__(self, checkout, threads, waits, scratch):
+        self.waits = waits
         # EPyMARL writes its records beside the folder of its program, which is therefore named through a link.
-        home = scratch / f"epymarl-{threads}"
+        home = scratch / f"epymarl-{threads}-{waits}"
         home.mkdir()
         (home / "src").symlink_to((checkout / "src").resolve())
         reports, writes = os.pipe()
@@ -139,11 +142,14 @@ class Peer:
         command = [PYTHON, HERE / "adapter.py", home / "src/main.py", str(threads), str(writes)]
         command += ["--config=qmix", "--env-config=sc2", "with", *settings]
         self.log = home / "log.txt"
+        environment = {**os.environ, "OMP_NUM_THREADS": str(threads), "PYTHONDONTWRITEBYTECODE": "1"}
+        if waits == "passive":
+            environment["OMP_WAIT_POLICY"] = "PASSIVE"
         with self.log.open("w") as log:
             self.process = subprocess.Popen(
                 command,
                 cwd=home,
-                env={**os.environ, "OMP_NUM_THREADS": str(threads), "PYTHONDONTWRITEBYTECODE": "1"},
+                env=environment,
                 stdin=subprocess.PIPE,
                 stdout=log,
                 stderr=subprocess.STDOUT,
@@ -162,7 +168,7 @@ class Peer:
 
     def window(self, seconds):
         print(seconds, file=self.process.stdin, flush=True)
-        return self.report()
+        return {**self.report(), "waits": self.waits}
 
     def end(self):
         self.process.kill()
@@ -227,28 +233,32 @@ def check_same(facts, run, threads):
 
 
 def compare(arguments, commit, scratch):
-    peers = {}
+    peers = {threads: [] for threads in arguments.threads}
+    checked = scratch / "checked"
+    trained(arguments.mackrl, 1, 100, 1, checked)
     try:
-        for threads in arguments.threads:
-            peers[threads] = Peer(arguments.epymarl, threads, scratch)
-            trained(arguments.mackrl, threads, 100, 1, scratch / "checked")
-            count = check_same(peers[threads].facts, scratch / "checked", threads)
-            peers[threads].window(0)
-        about = conditions(commit, peers[arguments.threads[0]].facts, scratch / "checked", count)
-        print(f"{'threads':>7} {'round':>5} {'EPyMARL':>9} {'mackrl':>9} {'ratio':>7} {'of CPU s':>9}", flush=True)
+        for threads in peers:
+            for waits in WAITS if threads > 1 else WAITS[:1]:
+                peer = Peer(arguments.epymarl, threads, waits, scratch)
+                peers[threads].append(peer)
+                count = check_same(peer.facts, checked, threads)
+                peer.window(0)
+        about = conditions(commit, peer.facts, checked, count)
+        print(f"{'threads':>7} {'round':>5} {'EPyMARL':>9} {'mackrl':>9} {'ratio':>7} {'of CPU s':>9}  EPyMARL waits", flush=True)
         rows = []
         for number in range(1, arguments.rounds + 1):
-            for threads, peer in peers.items():
-                measures = {
-                    "epymarl": lambda: peer.window(arguments.seconds),
-                    "mackrl": lambda: our_window(arguments, threads, number, scratch),
-                }
-                order = list(measures) if number % 2 else list(measures)[::-1]
-                measured = {name: measures[name]() for name in order}
-                rows.append({"threads": threads, "round": number, **{name: rates(measured[name]) for name in measures}})
-                tell(rows[-1])
+            for threads in peers:
+                row = {"threads": threads, "round": number}
+                for name in ["epymarl", "mackrl"] if number % 2 else ["mackrl", "epymarl"]:
+                    if name == "mackrl":
+                        row[name] = rates(our_window(arguments, threads, number, scratch))
+                    else:
+                        row["windows"] = [rates(peer.window(arguments.seconds)) for peer in peers[threads]]
+                        row[name] = max(row["windows"], key=lambda window: window["steps_per_s"])
+                rows.append(row)
+                tell(row)
     finally:
-        for peer in peers.values():
+        for peer in sum(peers.values(), []):
             peer.end()
     summary = [summed_up(threads, [row for row in rows if row["threads"] == threads]) for threads in peers]
     if arguments.json:
@@ -290,7 +300,7 @@ def ratio(row, figure):
 def tell(row):
     speeds = [f"{row[name]['steps_per_s']:9.1f}" for name in ("epymarl", "mackrl")]
     wall, cpu = ratio(row, "steps_per_s"), ratio(row, "steps_per_cpu_s")
-    print(f"{row['threads']:7} {row['round']:5} {' '.join(speeds)} {wall:7.2f} {cpu:9.2f}", flush=True)
+    print(f"{row['threads']:7} {row['round']:5} {' '.join(speeds)} {wall:7.2f} {cpu:9.2f}  {row['epymarl']['waits']}", flush=True)
 
 
 def summed_up(threads, rows):
