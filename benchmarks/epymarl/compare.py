@@ -12,10 +12,10 @@ QMIX, one environment, an update of 32 whole episodes after every episode, Adam,
 game or of the learner, the shapes of the networks, or the optimiser differ.
 
 Short windows of both alternate, on one thread and on two. EPyMARL's processes live on and wait while others are measured; a
-window of theirs is whole episodes after the first updates. With several threads PyTorch is measured twice, with threads that wait
-actively, as is its default, and passively: the first suffers from other load, and the faster one counts. Of ours two runs of the same seed are timed, a short one that ends
-after the first updates and a long one: their difference leaves out the start and the end. Steps a second of processor time stand
-beside, which other load on the machine changes less.
+window of theirs is whole episodes after the first updates. With several threads it is measured twice, with threads that wait for
+each other actively, as is the default, and passively: other load slows the first, and the faster one counts. Of ours two runs
+of the same seed are timed, a short one that ends after the first updates and a long one: their difference leaves out the start
+and the end. Steps a second of processor time stand beside, which other load on the machine changes less.
 """
 
 import argparse
@@ -54,7 +54,7 @@ THEIRS = {
     "test_interval": NEVER,
     "test_nepisode": 1,
 }
-# Where EPyMARL differs from our preset and has no setting: the optimiser, and what running out of time means.
+# EPyMARL's learner has Adam alone, and with `continuing_episode` off the limit of steps ends the game.
 OURS = {
     "algorithm.optimiser": '"adam"',
     "algorithm.optimiser_epsilon": "1e-8",
