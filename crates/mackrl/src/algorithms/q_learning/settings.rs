@@ -62,7 +62,7 @@ declare_settings! {
         /// as this can be used. It decides the last bits of a result, which the number of threads does not.
         shards: usize = 2, Accepts::integer(1, 4096);
         /// Whether the state at a time limit keeps its value; otherwise time running out counts as the end of the game.
-        bootstrap_at_time_limit: bool = true, Accepts::Flag;
+        bootstrap_at_time_limit: bool = false, Accepts::Flag;
     }
 }
 
