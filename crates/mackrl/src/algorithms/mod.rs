@@ -5,8 +5,8 @@
 //! [`built_in`]. Nothing here is closed: a program adds [`AlgorithmKind`]s of its own to its registry.
 
 mod actor_critic;
-mod agentwise;
 mod central_v;
+mod groupwise;
 mod iql;
 mod mackrl;
 mod ppo;
@@ -24,11 +24,11 @@ use mackrl_env::{
 };
 
 pub use actor_critic::{ActorCritic, ActorCriticSettings};
-pub use agentwise::{
-    Advantage, Agentwise, AgentwiseKind, AgentwiseSettings, Coma, Counterfactual, Iac, Judge,
-    OwnObservation,
-};
 pub use central_v::CentralV;
+pub use groupwise::{
+    Advantage, AgentwiseKind, Coma, Counterfactual, Groupwise, GroupwiseSettings, Iac, Judge,
+    MackrlComa, MackrlComaSettings, OwnObservation,
+};
 pub use iql::{Iql, Unmixed};
 pub use mackrl::{Levels, Mackrl, MackrlSettings, PartitionChoice};
 pub use ppo::{
@@ -210,6 +210,7 @@ pub fn built_in() -> Vec<Arc<dyn AlgorithmKind>> {
         Arc::new(Qmix::default()),
         Arc::new(Iac::default()),
         Arc::new(Coma::default()),
+        Arc::new(MackrlComa),
     ]
 }
 

@@ -1,13 +1,14 @@
-//! The settings of IAC and COMA.
+//! The settings of IAC, COMA and MACKRL-COMA.
 
 use mackrl_env::{
-    declare_settings,
+    EnvironmentSpec, declare_settings,
     settings::{Accepts, EXACT, SettingsError},
 };
 
+use super::Judge;
 use crate::{
     algorithms::shared_settings::{Exploration, OptimiserName},
-    critics::MemberCriticSettings,
+    critics::{ChoiceCriticSettings, MemberCriticSettings},
     nn::OptimiserKind,
     objectives::ReturnSettings,
 };
@@ -15,7 +16,7 @@ use crate::{
 declare_settings! {
     /// Sizes of the networks, how training explores (p = (1 − ε)·softmax + ε·uniform, with ε falling linearly), and how the
     /// agents and the critic learn.
-    pub struct AgentwiseSettings {
+    pub struct GroupwiseSettings {
         /// Units in each hidden layer and each recurrent state of the agents.
         hidden: usize = 64, Accepts::integer(1, 4096);
         /// Units in each of the critic's two hidden layers.
@@ -52,7 +53,7 @@ declare_settings! {
     }
 }
 
-impl AgentwiseSettings {
+impl GroupwiseSettings {
     /// How parameters follow the gradient.
     #[must_use]
     pub const fn optimiser(&self) -> OptimiserKind {
@@ -68,25 +69,40 @@ impl AgentwiseSettings {
         }
     }
 
-    /// The critic of `members` members that reads rows of `inputs` numbers and gives rows of `outputs`.
-    pub(super) fn critic(
-        &self,
-        [inputs, outputs]: [usize; 2],
-        members: usize,
-    ) -> MemberCriticSettings {
+    /// The critic of a team's members: of each, what it reads itself and what the judge adds.
+    pub(super) fn critic<J: Judge>(&self, spec: &EnvironmentSpec) -> MemberCriticSettings {
         MemberCriticSettings {
-            inputs,
-            hidden: self.critic_hidden,
-            outputs,
-            members,
-            optimiser: self.optimiser(),
-            learning_rate: self.critic_learning_rate,
-            gradient_norm_max: self.gradient_norm_max,
+            choices: self.choices::<J>("critic", 1, spec),
+            members: spec.agents,
             returns: ReturnSettings {
                 gamma: self.gamma,
                 lambda: self.lambda,
             },
             target_interval_updates: self.target_interval_updates,
+        }
+    }
+
+    /// The critic of pairs: of each, what both members read and what the judge adds.
+    pub(super) fn pair_critic<J: Judge>(&self, spec: &EnvironmentSpec) -> ChoiceCriticSettings {
+        self.choices::<J>("pair_critic", 2, spec)
+    }
+
+    fn choices<J: Judge>(
+        &self,
+        name: &'static str,
+        size: usize,
+        spec: &EnvironmentSpec,
+    ) -> ChoiceCriticSettings {
+        let own = spec.observation_size + spec.agents + spec.actions;
+        let choices = (0..size).fold(1, |product, _| product * spec.actions);
+        ChoiceCriticSettings {
+            name,
+            inputs: size * own + J::inputs(spec),
+            hidden: self.critic_hidden,
+            outputs: J::ADVANTAGE.outputs(choices),
+            optimiser: self.optimiser(),
+            learning_rate: self.critic_learning_rate,
+            gradient_norm_max: self.gradient_norm_max,
         }
     }
 
