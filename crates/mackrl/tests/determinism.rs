@@ -64,7 +64,7 @@ fn assert_same_run(found: &Outcome, expected: &Outcome, what: &str) {
 
 #[test]
 fn a_run_gives_the_same_bytes_twice_and_on_any_number_of_threads() {
-    let names = ["iql", "vdn", "qmix", "iac", "coma"];
+    let names = ["iql", "vdn", "qmix", "iac", "coma", "mackrl-coma"];
     let others = names.map(|name| format!("algorithm.name={name}"));
     let others = others.iter().map(String::as_str);
     for algorithm in [MACKRL, CENTRAL_V].into_iter().chain(others) {

@@ -122,8 +122,8 @@ fn a_run_that_goes_on_does_not_do_so_without_its_memory() {
 }
 
 #[test]
-fn agents_with_advantages_of_their_own_resume_as_well() {
-    for algorithm in ["iac", "coma"] {
+fn groups_with_advantages_of_their_own_resume_as_well() {
+    for algorithm in ["iac", "coma", "mackrl-coma"] {
         let config = config(algorithm);
         let whole = train(&config, &[1], u64::MAX);
         assert!(train(&config, &[2, 1], 2) == whole, "{algorithm}");
