@@ -8,6 +8,7 @@ mod actor_critic;
 mod central_v;
 mod groupwise;
 mod iql;
+mod jal;
 mod mackrl;
 mod ppo;
 mod q_learning;
@@ -30,6 +31,7 @@ pub use groupwise::{
     MackrlComa, MackrlComaSettings, OwnObservation,
 };
 pub use iql::{Iql, Unmixed};
+pub use jal::{Jal, JalSettings};
 pub use mackrl::{Levels, Mackrl, MackrlSettings, PartitionChoice};
 pub use ppo::{
     Groups, Ippo, MackrlPpo, MackrlPpoSettings, Mappo, PairMemory, Ppo, PpoSettings, Sight,
@@ -202,6 +204,7 @@ pub fn built_in() -> Vec<Arc<dyn AlgorithmKind>> {
     vec![
         Arc::new(Mackrl),
         Arc::new(CentralV),
+        Arc::new(Jal),
         Arc::new(MackrlPpo),
         Arc::new(Mappo::default()),
         Arc::new(Ippo::default()),

@@ -15,7 +15,7 @@ use crate::{
     experience::{Experience, Instance, Piece},
     marginalisation::pair::{PairGradient, PairRows, gradient_alone},
     nn::elementary::exponentials,
-    policy::{Parameters, Recording, TEAM},
+    policy::{Parameters, Reads, Recording, TEAM},
 };
 
 /// No row.
@@ -73,7 +73,8 @@ impl Hierarchy {
     pub fn factorises(&self) -> bool {
         let declaration = &self.parts.declaration;
         let levels = declaration.levels();
-        levels[TEAM].divisions == 1 && (levels.len() == 2 || declaration.is_pairwise())
+        let alone = levels[declaration.alone()].reads == Reads::OwnObservation;
+        levels[TEAM].divisions == 1 && alone && (levels.len() == 2 || declaration.is_pairwise())
     }
 
     /// The choices of an experience, group by group, of living agents.
