@@ -27,7 +27,7 @@ pub use tally::Tally;
 pub(crate) use thought::most_probable;
 pub use thought::{
     AgentThought, GroupChoice, GroupThought, JointOption, PairThought, PartitionThought,
-    SoloOption, Thought,
+    SoloOption, TeamOption, Thought,
 };
 pub use walk::{Path, Sampler};
 
