@@ -152,8 +152,8 @@ enum Rows<'a> {
 #[test]
 fn the_baseline_of_a_group_is_the_mean_of_q_given_what_the_others_do() {
     let mut compared = 0;
-    for seed in 0..7 {
-        let step = Step::random(seed, 2 * seed as usize);
+    for (seed, partition) in (0..7).zip((0..).step_by(2)) {
+        let step = Step::random(seed, partition);
         for u in step.tables.joint_actions() {
             if step.tables.log_likelihood(&u) == f64::NEG_INFINITY {
                 continue;
@@ -168,12 +168,12 @@ fn the_baseline_of_a_group_is_the_mean_of_q_given_what_the_others_do() {
     assert!(compared > 500, "{compared} baselines");
 }
 
-/// Σ_u p(u) Σ_g A_g(u) ∇ log q_g(u_g), with every joint action counted: with Q as advantage, and with Q less the baseline.
+/// `Σ_u p(u) Σ_g A_g(u) ∇ log q_g(u_g)`, with every joint action counted: with Q as advantage, and with Q less the baseline.
 #[test]
 fn the_baseline_leaves_the_expected_gradient_as_it_is() {
     let mut discriminating = [0; 2];
-    for seed in 0..7 {
-        let step = Step::random(seed, 2 * seed as usize);
+    for (seed, partition) in (0..7).zip((0..).step_by(2)) {
+        let step = Step::random(seed, partition);
         for group in &step.groups {
             let [mut without, mut with, mut weighed_wrongly] = [const { Vec::new() }; 3];
             for u in step.tables.joint_actions() {

@@ -45,7 +45,7 @@ impl<F: Element> PairRows<'_, F> {
     }
 
     /// How likely each of both ways to the members' actions is, given that they led there: jointly, and by delegation. These are the
-    /// derivatives of log q(u) with respect to log π(u), and to log π(delegate), log π_a(u_a) and log π_b(u_b); 0 if q(u) = 0.
+    /// derivatives of log q(u) with respect to log π(u), and to log π(delegate), log `π_a(u_a)` and log `π_b(u_b)`; 0 if q(u) = 0.
     #[must_use]
     pub fn posteriors(&self, actions: [usize; 2]) -> [F; 2] {
         let (joint, delegated) = self.terms(actions);

@@ -115,7 +115,8 @@ impl Run {
                 .any(|known| name == *known || known.ends_with('_') && name.starts_with(known));
             assert!(known, "{name}");
         }
-        assert!(tally.means().all(|(_, mean)| mean.is_finite()));
+        let are_finite = tally.means().all(|(_, mean)| mean.is_finite());
+        assert!(are_finite, "{tally:?}");
     }
 
     /// Asserts that agents on their own do what the team does, with all checks of the certificate, with exploration ε.
@@ -139,8 +140,9 @@ impl Run {
             sampled: Behaviour::sampled(exploration),
         };
         let certificate = subject.certify(2, |_, _| {}).expect("agents answer");
-        assert_eq!(certificate.first_mismatch, None);
-        assert!(certificate.actions_compared > 0 && certificate.altered_actions_compared > 0);
+        assert_eq!(certificate.first_mismatch, None, "an agent differs");
+        let compared = certificate.actions_compared > 0 && certificate.altered_actions_compared > 0;
+        assert!(compared, "{certificate:?}");
     }
 }
 

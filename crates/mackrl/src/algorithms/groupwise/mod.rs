@@ -14,7 +14,7 @@
 //! does, leaves the expected gradient as it is. MACKRL-COMA has one partition in force at a time for this; a pair that commonly knows no
 //! joint action is two agents. The sum over a pair's A² joint actions is exact: a critic of pairs has an output for each of them, as the
 //! pair's controller has, so that it costs one pass of a network for each pair. The alternative, a Q that reads the joint action, needs
-//! A² passes, 1 296 for each pair of 27m_vs_30m. All critics estimate the same Q(s, u), and pairs last for a step: the target of a pair's
+//! A² passes, 1 296 for each pair of `27m_vs_30m`. All critics estimate the same Q(s, u), and pairs last for a step: the target of a pair's
 //! value is the mean of its members' λ-returns. Delegation is summed out on both sides: the advantage multiplies ∇ log q.
 
 mod learner;

@@ -15,11 +15,11 @@ use crate::{
 
 declare_settings! {
     /// Sizes of the networks, how training explores (p = (1 − ε)·softmax + ε·uniform, with ε falling linearly), and how the
-    /// agents and the critic learn.
+    /// controllers and the critics learn.
     pub struct GroupwiseSettings {
-        /// Units in each hidden layer and each recurrent state of the agents.
+        /// Units in each hidden layer and each recurrent state.
         hidden: usize = 64, Accepts::integer(1, 4096);
-        /// Units in each of the critic's two hidden layers.
+        /// Units in each of a critic's two hidden layers.
         critic_hidden: usize = 128, Accepts::integer(1, 4096);
         /// ε, a probability, at the first environment step.
         exploration_start: f64 = 0.5, Accepts::within(0.0, 1.0);
@@ -27,13 +27,13 @@ declare_settings! {
         exploration_finish: f64 = 0.01, Accepts::within(0.0, 1.0);
         /// Environment steps, summed over the parallel environments, over which ε falls.
         exploration_steps_env: u64 = 100_000, Accepts::integer(1, EXACT);
-        /// How parameters follow the gradient, for the agents and for the critic.
+        /// How parameters follow the gradient, for the controllers and for the critic.
         optimiser: OptimiserName = OptimiserName::Rmsprop, OptimiserName::ACCEPTS;
         /// What is added to the root of the mean squared gradient before a step is divided by it.
         optimiser_epsilon: f64 = 1e-5, Accepts::above_within(0.0, 1.0);
         /// Of `rmsprop`: how much of the mean squared gradient is kept at a step. The larger, the longer its memory.
         rmsprop_smoothing: f64 = 0.99, Accepts::within(0.0, 0.999_999);
-        /// Step size of the agents.
+        /// Step size of the controllers.
         learning_rate: f64 = 5e-4, Accepts::above_within(0.0, 1.0);
         /// Step size of the critic.
         critic_learning_rate: f64 = 5e-4, Accepts::above_within(0.0, 1.0);
