@@ -124,3 +124,106 @@ pub(super) fn read_pairs<'a, J: Judge>(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use mackrl_env::{
+        EpisodeKey, Stream,
+        matrix_game::{ACTIONS, MatrixGameKind, MatrixGameSettings},
+    };
+
+    use super::*;
+    use crate::{
+        algorithms::groupwise::{Counterfactual, GroupwiseSettings, hierarchy},
+        common_knowledge::CommonKnowledgeFeatures,
+        experience::{Collector, PlaySettings},
+        hierarchy::Weighing,
+        partition::PartitionSchedule,
+        policy::{Behaviour, Declaration, Delegation, Parameters, Policy, Recording, Selection},
+    };
+
+    /// On the matrix game with common knowledge both agents are one pair at every step.
+    #[test]
+    fn a_pairs_row_has_both_members_the_state_and_the_column_of_what_they_did() {
+        let game = MatrixGameSettings {
+            common_knowledge: 1.0,
+            ..MatrixGameSettings::default()
+        };
+        let world = MatrixGameKind::world(game).unwrap();
+        let (environment, spec) = (world.make(), world.spec());
+        let prior = environment.prior_knowledge();
+        let team = crate::algorithms::Team {
+            spec,
+            prior: &prior,
+            seed: 1,
+            threads: 1,
+        };
+        let declaration = Declaration::pairwise(
+            [2, ACTIONS],
+            PartitionSchedule::RoundRobin,
+            Selection::Learned,
+            Delegation::Learned,
+            1,
+        );
+        let settings = GroupwiseSettings::default();
+        let features = CommonKnowledgeFeatures::Complete;
+        let hierarchy = hierarchy(declaration.unwrap(), features, &settings, team);
+        let parameters = Parameters::new(hierarchy.initialise(1));
+        let environments = (0..9).map(|_| world.make()).collect();
+        let mut collector = Collector::new(&hierarchy, environments, 1, 1);
+        let keys: Vec<EpisodeKey> = (0..9)
+            .map(|episode| EpisodeKey::new(1, Stream::Training, episode))
+            .collect();
+        let play = PlaySettings {
+            behaviour: Behaviour::sampled(0.5),
+            recording: Recording::ForLearning,
+        };
+        collector.play(&parameters, &keys, play).unwrap();
+        let batch: Vec<&mut Piece> = collector.pieces().collect();
+        let experience = &batch[0].experience;
+        let episodes: Vec<&Episode> = experience.episodes.iter().collect();
+
+        let mut members = MemberRows::default();
+        let own = settings.critic::<Counterfactual>(spec);
+        let bank = hierarchy.declaration().alone();
+        read_members::<Counterfactual>(&mut members, spec, &own, (&batch, bank), &episodes);
+        let mut choices = Choices {
+            factors: hierarchy.factors(experience, Weighing::Choosing),
+            ..Choices::default()
+        };
+        choices.place(&members, 2);
+        let targets: Vec<f32> = (0..18_u8).map(f32::from).collect();
+        let (mut rows, mut target_r) = (ChoiceRows::default(), Vec::new());
+        let critic = settings.pair_critic::<Counterfactual>(spec);
+        read_pairs::<Counterfactual>(
+            (&mut rows, &mut target_r),
+            (&members, &targets),
+            spec,
+            &critic,
+            std::iter::once(&mut choices),
+            &episodes,
+        );
+        assert_eq!((rows.len(), choices.row_i.len()), (9, 9), "a pair each");
+        let reads = spec.observation_size + 2 + ACTIONS;
+        let mut columns = std::collections::BTreeSet::new();
+        for (factor, &row) in choices.factors.iter().zip(&choices.row_i) {
+            let b = factor.episode;
+            let [first, second] = [0, 1].map(|agent| episodes[b].actions(0)[agent].index());
+            assert_eq!(rows.column_r[row], ACTIONS * first + second);
+            columns.insert(rows.column_r[row]);
+            let own = [0, 1].map(|member| members.row([b, 0], member, 2));
+            assert_eq!(target_r[row], (targets[own[0]] + targets[own[1]]) / 2.0);
+            let input = &rows.input_rf[row * critic.inputs..(row + 1) * critic.inputs];
+            let width = reads + spec.state_size + 2 * ACTIONS;
+            for (place, member) in own.into_iter().enumerate() {
+                let read = &members.rows.input_rf[member * width..][..reads];
+                assert_eq!(read[spec.observation_size + place], 1.0, "identity");
+                assert_eq!(&input[place * reads..(place + 1) * reads], read);
+            }
+            let (state, others) = input[2 * reads..].split_at(spec.state_size);
+            assert_eq!(state, episodes[b].state(0));
+            assert!(others.iter().all(|&action| action == 0.0), "nobody else");
+        }
+        assert!(columns.len() > 4, "hardly any joint action: {columns:?}");
+    }
+}
