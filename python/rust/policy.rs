@@ -6,7 +6,7 @@ use std::{
 };
 
 use mackrl::{
-    NotFinite,
+    Error,
     algorithms::Algorithm,
     experience::Experience,
     policy::{
@@ -244,7 +244,7 @@ impl Acting {
         }
     }
 
-    fn act(&mut self, parameters: &Parameters, behaviour: Behaviour) -> Result<(), NotFinite> {
+    fn act(&mut self, parameters: &Parameters, behaviour: Behaviour) -> Result<(), Error> {
         let situation = Self::situation(
             (&self.playing, &self.keys),
             &self.observations,
@@ -313,7 +313,7 @@ impl Play {
         }
         let at_work = &mut *acting;
         let acted = py.detach(|| at_work.act(&self.parameters, self.behaviour));
-        acted.map_err(|error| learning(error.into()))?;
+        acted.map_err(learning)?;
         let actions = acting.actions_bn.iter().map(|action| action.index());
         let actions = actions.map(|action| i64::try_from(action).expect("actions are few"));
         let actions: Vec<i64> = actions.collect();

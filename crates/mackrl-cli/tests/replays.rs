@@ -189,3 +189,31 @@ fn the_matrix_game_has_no_replays() {
         "{error}"
     );
 }
+
+#[test]
+fn what_a_whole_team_could_do_is_explained() {
+    let folder = tempfile::tempdir().expect("a folder for the story");
+    let folder = folder.path();
+    succeeds(
+        folder,
+        "train --map 3m --algorithm jal --set env.sight_range=64 --steps 300 --set test.episodes=2 --out run",
+    );
+    succeeds(folder, "evaluate run --episodes 1 --save-replays 1");
+    let mut replays = fs::read_dir(folder.join("run/replays")).expect("a kept replay");
+    let replay = replays.next().expect("one").expect("a file").path();
+    let replay = replay.display();
+    let told = succeeds(folder, &format!("explain {replay} --step 0"));
+    assert!(
+        told.contains("The whole team (> was taken)\n  A, B, C: > "),
+        "{told}"
+    );
+    assert!(
+        told.contains("The way that was taken\n  A, B, C: "),
+        "{told}"
+    );
+    assert!(!told.contains("Agents alone"), "{told}");
+    let alone = succeeds(folder, &format!("explain {replay} --step 0 --agent A"));
+    assert!(alone.contains("The whole team"), "{alone}");
+    let pair = succeeds(folder, &format!("explain {replay} --step 0 --group A,B"));
+    assert!(!pair.contains("The whole team"), "{pair}");
+}

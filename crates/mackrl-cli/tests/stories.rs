@@ -170,7 +170,7 @@ fn a_value_out_of_range_says_what_is_expected() {
     hint: algorithm.gamma: Discount γ of one environment step.
     ");
     insta::assert_snapshot!(type_in("config --algorithm maddpg").fails(64), @r#"
-    error: --algorithm maddpg: `algorithm.name` is "maddpg", expected `mackrl`, `central-v`, `mackrl-ppo`, `mappo`, `ippo`, `iql`, `vdn`, `qmix`, `iac` or `coma`
+    error: --algorithm maddpg: `algorithm.name` is "maddpg", expected `mackrl`, `central-v`, `jal`, `mackrl-ppo`, `mappo`, `ippo`, `iql`, `vdn`, `qmix`, `iac`, `coma` or `mackrl-coma`
     hint: algorithm.name: What learns; which other settings `algorithm` has depends on it.
     "#);
 }

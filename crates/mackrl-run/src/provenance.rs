@@ -32,7 +32,8 @@ pub const CODE: &str = concat!(env!("CARGO_PKG_VERSION"), "+", env!("MACKRL_SOUR
 ///
 /// 1: mackrl 0.1.0, which drew and learnt with the exponential function of the platform. 2: our own, the same on every machine.
 /// 3: the policy loss of the paper's learner over a buffer of fixed size. 4: recurrent states normalised under a clipped surrogate.
-pub const LEARNING_VERSION: u32 = 4;
+/// 5: IAC and COMA differentiate the policy with exploration mixed in.
+pub const LEARNING_VERSION: u32 = 5;
 
 /// The versions of runs that do not say, which mackrl 0.1.0 made.
 const FIRST: Versions = Versions {

@@ -87,7 +87,7 @@ fn inner(bound: Bound<f64>, direction: f64) -> f64 {
 }
 
 /// Worlds and algorithms that need nothing but this program.
-const CHOICES: [[&str; 2]; 10] = [
+const CHOICES: [[&str; 2]; 12] = [
     ["env.name=skirmish", "algorithm.name=mackrl"],
     ["env.name=skirmish", "algorithm.name=central-v"],
     ["env.name=matrix-game", "algorithm.name=mackrl"],
@@ -98,6 +98,8 @@ const CHOICES: [[&str; 2]; 10] = [
     ["env.name=skirmish", "algorithm.name=iql"],
     ["env.name=skirmish", "algorithm.name=qmix"],
     ["env.name=matrix-game", "algorithm.name=vdn"],
+    ["env.name=skirmish", "algorithm.name=mackrl-coma"],
+    ["env.name=matrix-game", "algorithm.name=mackrl-coma"],
 ];
 
 /// The settings of a choice, its names aside.

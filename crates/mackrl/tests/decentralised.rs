@@ -5,7 +5,7 @@ mod support;
 use std::sync::{Arc, Mutex};
 
 use mackrl::{
-    Error, NotFinite, Stopwatch, decentralised::*, experience::Experience, hierarchy::Hierarchy,
+    Error, Stopwatch, decentralised::*, experience::Experience, hierarchy::Hierarchy,
     nn::ParameterLayout, policy::*,
 };
 use mackrl_env::*;
@@ -103,7 +103,7 @@ impl Actor for FaultyActor {
         situation: Situation<'_>,
         experience: &mut Experience,
         actions_bn: &mut [Action],
-    ) -> Result<(), NotFinite> {
+    ) -> Result<(), Error> {
         self.actor
             .act(parameters, situation, experience, actions_bn)?;
         let Situation {

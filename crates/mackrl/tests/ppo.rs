@@ -5,90 +5,19 @@ mod support;
 
 use mackrl::{
     Error, Stopwatch,
-    algorithms::{Algorithm, AlgorithmKind, AlgorithmState, Ippo, MackrlPpo, Mappo, StoredState},
+    algorithms::{AlgorithmKind, Ippo, MackrlPpo, Mappo},
     common_knowledge::CommonKnowledgeFeatures,
-    decentralised::{AgentLink, InProcessAgent, Isolation, Repetition, Subject},
-    experience::{Collector, PlaySettings},
+    experience::PlaySettings,
     hierarchy::{FactorWorkspace, HierarchySettings, NetworkStyle, Weighing},
-    nn::ParameterLayout,
     partition::PartitionSchedule,
-    policy::{Behaviour, Declaration, Memory, Parameters, Recording, Selection, Tally},
+    policy::{Behaviour, Declaration, Memory, Parameters, Recording, Selection},
 };
-use mackrl_env::{AgentId, EpisodeKey, Stream};
-use mackrl_run::training::assembly::RunWorld;
-use support::team::{Team, keys, world};
+use support::{
+    learner::{Run, Stored, tensors},
+    team::{Team, keys, world},
+};
 
 const SMALL: &str = "hidden = 5\ncritic_hidden = 7\nenvironments = 4\nepochs = 2\n";
-
-/// A state that was stored, word for word.
-struct Stored(AlgorithmState);
-
-impl StoredState for Stored {
-    fn tensors(&self, layout: &ParameterLayout) -> Result<Vec<f32>, Error> {
-        let own = (self.0.tensors.iter()).find(|(own, _)| own.tensors() == layout.tensors());
-        own.map(|(_, values)| values.clone())
-            .ok_or_else(|| Error::Data("missing".to_owned()))
-    }
-
-    fn counter(&self, name: &str) -> Result<u64, Error> {
-        let count = self.0.counters.get(name).copied();
-        count.ok_or_else(|| Error::Data(format!("{name} is missing")))
-    }
-}
-
-/// A learner and the worlds that it plays in.
-struct Run {
-    algorithm: Box<dyn Algorithm>,
-    collector: Collector,
-    episodes: u64,
-}
-
-impl Run {
-    fn new(world: &RunWorld, kind: &dyn AlgorithmKind, settings: &str, threads: usize) -> Self {
-        let mut table = kind.defaults();
-        for own in [SMALL, settings] {
-            table.extend(toml::from_str::<toml::Table>(own).expect("TOML"));
-        }
-        kind.check(&table, world.spec())
-            .expect("settings within their ranges");
-        let prior = world.prior();
-        let team = mackrl::algorithms::Team {
-            spec: world.spec(),
-            prior: &prior,
-            seed: 1,
-            threads,
-        };
-        let algorithm = kind.build(&table, team).expect("a team that can be built");
-        let environments = world.environments(algorithm.environments());
-        let collector = Collector::new(
-            algorithm.policy(),
-            environments,
-            algorithm.shards(),
-            threads,
-        );
-        Self {
-            algorithm,
-            collector,
-            episodes: 0,
-        }
-    }
-
-    fn update(&mut self) -> Tally {
-        let keys = [0, 1, 2, 3].map(|i| EpisodeKey::new(1, Stream::Training, self.episodes + i));
-        self.episodes += 4;
-        let settings = PlaySettings {
-            behaviour: self.algorithm.behaviour(0),
-            recording: Recording::ForLearning,
-        };
-        let played = self
-            .collector
-            .play(self.algorithm.parameters(), &keys, settings);
-        played.expect("masks agree with the world");
-        let mut batch: Vec<_> = self.collector.pieces().collect();
-        let learnt = self.algorithm.learn(&mut batch, &mut Stopwatch::default());
-        learnt.expect("finite numbers")
-    }
-}
 
 fn round_robin(map: &str, hold: usize, memory: Memory) -> Team {
     let world = world(&[map]);
@@ -111,19 +40,21 @@ fn round_robin(map: &str, hold: usize, memory: Memory) -> Team {
     Team::declared(world, declaration, settings)
 }
 
-/// `Σ_g log q_g` is the log p(u) that acting recorded, and where all groups of a step weigh alike the gradient is the marginal's.
+/// `Σ_g log q_g` is the log p(u) that acting recorded, and where all groups of a step weigh alike the gradient is the marginal's,
+/// of which exploration is a part.
 #[test]
 fn groups_together_are_the_marginal_of_the_team() {
-    for (hold, memory) in [
-        (1, Memory::WhileFormed),
-        (4, Memory::WhileFormed),
-        (1, Memory::Episode),
+    for (hold, memory, exploration) in [
+        (1, Memory::WhileFormed, 0.0),
+        (4, Memory::WhileFormed, 0.0),
+        (1, Memory::Episode, 0.0),
+        (1, Memory::WhileFormed, 0.3),
     ] {
         let team = round_robin("env.map=2s3z", hold, memory);
         let parameters = Parameters::new(team.initialise());
         let mut collector = team.collector(2, 1);
         let play = PlaySettings {
-            behaviour: Behaviour::sampled(0.0),
+            behaviour: Behaviour::sampled(exploration),
             recording: Recording::ForLearning,
         };
         collector.play(&parameters, &keys(2), play).unwrap();
@@ -171,7 +102,7 @@ fn groups_together_are_the_marginal_of_the_team() {
                 &mut FactorWorkspace::default(),
                 &mut gradient,
             );
-            assert!(entropy > 0.0);
+            assert_eq!(entropy > 0.0, exploration == 0.0);
             let largest = expected.iter().fold(0.0_f32, |most, x| most.max(x.abs()));
             for (found, expected) in gradient.iter().zip(&expected) {
                 assert!(
@@ -233,29 +164,9 @@ fn the_gradient_of_the_entropy_is_that_of_the_networks() {
 #[test]
 fn mackrl_ppo_that_always_delegates_is_mappo_to_the_bit() {
     let world = world(&["env.map=2s3z"]);
-    let mut mappo = Run::new(&world, &Mappo::default(), "", 1);
-    let mut mackrl = Run::new(&world, &MackrlPpo, "delegation = \"always\"", 1);
-    // The same agent controllers and the same critic.
-    let mut state = mackrl.algorithm.state();
-    let own = mappo.algorithm.state();
-    let tensors = |state: &AlgorithmState, name: &str| -> Vec<f32> {
-        let named = state.tensors.iter().flat_map(|(layout, values)| {
-            let tensors = layout.tensors().iter();
-            tensors.map(move |tensor| (tensor, &values[tensor.range.clone()]))
-        });
-        named
-            .filter(|(tensor, _)| tensor.name.starts_with(name))
-            .flat_map(|(_, values)| values.to_vec())
-            .collect()
-    };
-    for (layout, values) in &mut state.tensors {
-        for tensor in layout.tensors() {
-            if tensor.name.starts_with("agent_controller") || tensor.name.starts_with("critic.") {
-                values[tensor.range.clone()].copy_from_slice(&tensors(&own, &tensor.name));
-            }
-        }
-    }
-    mackrl.algorithm.restore(&Stored(state)).unwrap();
+    let mut mappo = Run::new(&world, &Mappo::default(), [SMALL, ""], 1);
+    let mut mackrl = Run::new(&world, &MackrlPpo, [SMALL, "delegation = \"always\""], 1);
+    mackrl.share(&mappo);
     for update in 0..3 {
         mappo.update();
         mackrl.update();
@@ -280,7 +191,7 @@ fn ratios_are_those_to_what_acted() {
         let divergence = |minibatches: usize| {
             let settings =
                 format!("partitions = \"{partitions}\"\nepochs = 1\nminibatches = {minibatches}");
-            let tally = Run::new(&world, &MackrlPpo, &settings, 1).update();
+            let tally = Run::new(&world, &MackrlPpo, [SMALL, &settings], 1).update();
             let mut means = tally.means();
             let divergence = means.find(|(name, _)| *name == "divergence");
             divergence.expect("a metric of the learner").1
@@ -305,8 +216,8 @@ fn a_run_has_the_same_bits_on_any_number_of_threads_and_after_a_restoration() {
         (&Ippo::default(), ""),
     ];
     for (kind, settings) in kinds {
-        let mut whole = Run::new(&world, kind, settings, 1);
-        let mut threads = Run::new(&world, kind, settings, 3);
+        let mut whole = Run::new(&world, kind, [SMALL, settings], 1);
+        let mut threads = Run::new(&world, kind, [SMALL, settings], 3);
         let initial = whole.algorithm.parameters().values().to_vec();
         for _ in 0..2 {
             assert_eq!(whole.update(), threads.update());
@@ -314,7 +225,7 @@ fn a_run_has_the_same_bits_on_any_number_of_threads_and_after_a_restoration() {
         assert_ne!(whole.algorithm.parameters().values(), initial);
         let stored = Stored(whole.algorithm.state());
         assert_eq!(threads.algorithm.state(), stored.0, "{}", kind.name());
-        let mut resumed = Run::new(&world, kind, settings, 2);
+        let mut resumed = Run::new(&world, kind, [SMALL, settings], 2);
         resumed.algorithm.restore(&stored).unwrap();
         resumed.episodes = whole.episodes;
         assert_eq!(whole.update(), resumed.update());
@@ -331,27 +242,15 @@ fn every_metric_that_is_reported_is_explained() {
         (&Ippo::default(), ""),
     ];
     for (kind, settings) in kinds {
-        let mut run = Run::new(&world, kind, settings, 1);
-        let mut tally = run.update();
-        tally.merge(&run.collector.tally());
-        let of_policy = run.algorithm.policy().metrics();
-        let of_learner = run.algorithm.metrics().iter().map(|(name, _)| *name);
-        let names = of_policy.iter().map(|(name, _)| name.as_str());
-        let metrics: Vec<&str> = of_learner.chain(names).collect();
-        for name in tally.names() {
-            let known = metrics
-                .iter()
-                .any(|known| name == *known || known.ends_with('_') && name.starts_with(known));
-            assert!(known, "{name}");
-        }
-        assert!(tally.means().all(|(_, mean)| mean.is_finite()));
+        let mut run = Run::new(&world, kind, [SMALL, settings], 1);
+        run.assert_explained();
     }
 }
 
 #[test]
 fn experience_that_is_not_finite_is_refused() {
     let world = world(&["env.map=3m"]);
-    let mut run = Run::new(&world, &MackrlPpo, "", 1);
+    let mut run = Run::new(&world, &MackrlPpo, [SMALL, ""], 1);
     run.update();
     let piece = run.collector.pieces().next().unwrap();
     piece.experience.episodes[1].reward_t[2] = f32::NAN;
@@ -369,29 +268,8 @@ fn agents_on_their_own_play_what_a_trained_team_plays() {
         "hold_steps_env = 0",
         "pair_memory = \"episode\"",
     ] {
-        let mut run = Run::new(&world, &MackrlPpo, settings, 1);
+        let mut run = Run::new(&world, &MackrlPpo, [SMALL, settings], 1);
         run.update();
-        let policy = run.algorithm.policy();
-        let parameters = run.algorithm.parameters();
-        let mut links: Vec<Box<dyn AgentLink + '_>> = (0..world.spec().agents)
-            .map(|agent| policy.executor(AgentId::new(agent)))
-            .map(|executor| {
-                Box::new(InProcessAgent::new(executor, parameters)) as Box<dyn AgentLink>
-            })
-            .collect();
-        let mut environment = world.environments(1).remove(0);
-        let mut subject = Subject {
-            policy,
-            parameters,
-            environment: &mut *environment,
-            repetition: Repetition::Exact,
-            isolation: Isolation::None,
-            links: &mut links,
-            seed: 5,
-            sampled: Behaviour::sampled(0.0),
-        };
-        let certificate = subject.certify(2, |_, _| {}).expect("agents answer");
-        assert_eq!(certificate.first_mismatch, None, "{settings}");
-        assert!(certificate.actions_compared > 0 && certificate.altered_actions_compared > 0);
+        run.assert_decentralised(&world, 0.0);
     }
 }

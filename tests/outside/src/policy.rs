@@ -1,7 +1,7 @@
 //! Each agent's own linear softmax over its own observation.
 
 use mackrl::{
-    NotFinite, Stopwatch,
+    Error, Stopwatch,
     experience::{Experience, Instance, Rows},
     nn::ParameterLayout,
     policy::{
@@ -159,7 +159,7 @@ impl Actor for LinearActor {
         situation: Situation<'_>,
         experience: &mut Experience,
         actions_bn: &mut [Action],
-    ) -> Result<(), NotFinite> {
+    ) -> Result<(), Error> {
         let agents = self.policy.agents;
         let instances: Vec<Instance> = situation
             .playing

@@ -275,7 +275,15 @@ mod tests {
                         .and_then(|builder| {
                             builder.set(&format!("algorithm.name={}", algorithm.name()))
                         });
-                    let config = builder.unwrap().build().unwrap();
+                    let built = builder.unwrap().build();
+                    if algorithm.name() == "jal"
+                        && let Err(refused) = &built
+                    {
+                        // The team of the preset's map is too large for one controller.
+                        assert!(refused.to_string().contains("joint actions"), "{refused}");
+                        continue;
+                    }
+                    let config = built.unwrap();
                     let names = (config.env.name(), config.algorithm.name());
                     assert_eq!(names, (world.name(), algorithm.name()));
                     let moves = config.get("env.move_amount");

@@ -1,5 +1,6 @@
 //! A replay played again, with every state at hand.
 
+use mackrl::policy::GroupThought;
 use mackrl_env::{Action, AgentId, EntitySet, Environment, EpisodeEnd, Observations};
 use mackrl_skirmish::{BattleStatistics, Skirmish, rules::BattleState};
 
@@ -136,6 +137,7 @@ impl Playback {
         let is_action = |action: &Action| action.index() < spec.actions;
         let groups = thought.partitions.iter().flat_map(|p| &p.groups).flatten();
         let mut named = groups
+            .chain(thought.groups.iter().flat_map(|group| &group.members))
             .chain(thought.pairs.iter().flat_map(|pair| &pair.members))
             .chain(thought.agents.iter().map(|agent| &agent.agent));
         if let Some(agent) = named.find(|agent| !is_agent(agent)) {
@@ -143,14 +145,23 @@ impl Playback {
         }
         let joint = thought.pairs.iter().flat_map(|pair| &pair.joint);
         let solo = thought.agents.iter().flat_map(|agent| &agent.options);
+        let team = thought.groups.iter().flat_map(|group| &group.joint);
         let mut taken = joint
             .flat_map(|option| &option.actions)
+            .chain(team.flat_map(|option| &option.actions))
             .chain(solo.map(|option| &option.action));
         if let Some(action) = taken.find(|action| !is_action(action)) {
             return Some(format!(
                 "action {action}, expected less than {}",
                 spec.actions
             ));
+        }
+        let has_all = |group: &GroupThought| {
+            let mut joint = group.joint.iter();
+            joint.all(|option| option.actions.len() == group.members.len())
+        };
+        if !thought.groups.iter().all(has_all) {
+            return Some("a joint action that is not one of each member".to_owned());
         }
         if let Some(number) = numbers_that_cannot_be(step) {
             return Some(number);
@@ -206,6 +217,8 @@ fn numbers_that_cannot_be(step: &Step) -> Option<String> {
     });
     let options = thought.agents.iter().flat_map(|agent| &agent.options);
     let options = options.map(|option| option.probability);
+    let team = thought.groups.iter().flat_map(|group| &group.joint);
+    let options = options.chain(team.map(|option| option.probability));
     let ways = [thought.log_p_path.exp(), thought.log_p.exp()];
     let numbers = partitions.chain(pairs).chain(options).map(f64::from);
     let wrong = numbers

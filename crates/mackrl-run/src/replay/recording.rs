@@ -1,7 +1,7 @@
 //! Episodes that are played in order to be kept.
 
 use mackrl::{
-    Error, NotFinite,
+    Error,
     algorithms::Algorithm,
     experience::Experience,
     policy::{Actor, Behaviour, Recording, Situation, Thought},
@@ -105,7 +105,7 @@ impl Watched {
         observations: &Observations,
         step: usize,
         actions: &mut [Action],
-    ) -> Result<Thought, NotFinite> {
+    ) -> Result<Thought, Error> {
         let situation = Situation {
             step,
             playing: &[0],
@@ -128,7 +128,7 @@ fn record(
     mut skirmish: Skirmish,
     env: &EnvironmentConfig,
     (player, key): (Player, EpisodeKey),
-    mut choose: impl FnMut(&Observations, usize, &mut [Action]) -> Result<Chosen, NotFinite>,
+    mut choose: impl FnMut(&Observations, usize, &mut [Action]) -> Result<Chosen, Error>,
 ) -> Result<Replay, Error> {
     let mut observations = Observations::new(skirmish.spec(), 1);
     let mut actions = vec![Action::default(); skirmish.spec().agents];

@@ -230,6 +230,60 @@ fn what_a_stranger_changed_is_found_out() {
 }
 
 #[test]
+fn the_joint_action_of_a_team_is_told_of_the_living_and_checked() {
+    let replay = sampled(&["algorithm.name=jal", "env.sight_range=64"]);
+    let playback = Replay::from_bytes(&replay.to_bytes()).and_then(|read| read.play());
+    let playback = playback.unwrap();
+    let mut sizes = std::collections::BTreeSet::new();
+    for (step, moment) in replay.steps.iter().zip(&playback.moments) {
+        let thought = step.thought.as_ref().expect("an acting team");
+        let [team] = &thought.groups[..] else {
+            panic!("one group: {:?}", thought.groups);
+        };
+        sizes.insert(team.members.len());
+        let alive = |agent: &AgentId| !moment.visible_n[agent.index()].is_empty();
+        assert!(team.members.iter().all(alive), "the dead take no part");
+        let taken: Vec<_> = team
+            .members
+            .iter()
+            .map(|a| step.actions[a.index()])
+            .collect();
+        let option = team.joint.iter().find(|option| option.actions == taken);
+        let p = f64::from(option.expect("what was done is told").probability);
+        assert!(
+            (p.ln() - thought.log_p).abs() < 1e-4,
+            "{p} {}",
+            thought.log_p
+        );
+        assert_eq!(thought.log_p, thought.log_p_path);
+    }
+    assert!(sizes.len() > 1, "nobody dies: {sizes:?}");
+    for (from, to, expected) in [
+        (
+            "\"joint\":[{\"actions\":[",
+            "\"joint\":[{\"actions\":[1,",
+            "one of each member",
+        ),
+        (
+            "\"joint\":[{\"actions\":[",
+            "\"joint\":[{\"actions\":[1",
+            "expected less than 9",
+        ),
+        (
+            "\"members\":[0",
+            "\"members\":[99",
+            "agent 99, expected less than 3",
+        ),
+    ] {
+        let error = error_after(&replay, |text| {
+            assert!(text.contains(from), "{from}");
+            text.replacen(from, to, 1)
+        });
+        assert!(error.to_string().contains(expected), "{error}");
+    }
+}
+
+#[test]
 fn a_file_cut_anywhere_is_refused() {
     let bytes = sampled(&[]).to_bytes();
     for end in (0..bytes.len()).step_by(97) {

@@ -5,9 +5,10 @@
 //! [`built_in`]. Nothing here is closed: a program adds [`AlgorithmKind`]s of its own to its registry.
 
 mod actor_critic;
-mod agentwise;
 mod central_v;
+mod groupwise;
 mod iql;
+mod jal;
 mod mackrl;
 mod ppo;
 mod q_learning;
@@ -24,12 +25,13 @@ use mackrl_env::{
 };
 
 pub use actor_critic::{ActorCritic, ActorCriticSettings};
-pub use agentwise::{
-    Advantage, Agentwise, AgentwiseKind, AgentwiseSettings, Coma, Counterfactual, Iac, Judge,
-    OwnObservation,
-};
 pub use central_v::CentralV;
+pub use groupwise::{
+    Advantage, AgentwiseKind, Coma, Counterfactual, Groupwise, GroupwiseSettings, Iac, Judge,
+    MackrlComa, MackrlComaSettings, OwnObservation,
+};
 pub use iql::{Iql, Unmixed};
+pub use jal::{Jal, JalSettings};
 pub use mackrl::{Levels, Mackrl, MackrlSettings, PartitionChoice};
 pub use ppo::{
     Groups, Ippo, MackrlPpo, MackrlPpoSettings, Mappo, PairMemory, Ppo, PpoSettings, Sight,
@@ -202,6 +204,7 @@ pub fn built_in() -> Vec<Arc<dyn AlgorithmKind>> {
     vec![
         Arc::new(Mackrl),
         Arc::new(CentralV),
+        Arc::new(Jal),
         Arc::new(MackrlPpo),
         Arc::new(Mappo::default()),
         Arc::new(Ippo::default()),
@@ -210,6 +213,7 @@ pub fn built_in() -> Vec<Arc<dyn AlgorithmKind>> {
         Arc::new(Qmix::default()),
         Arc::new(Iac::default()),
         Arc::new(Coma::default()),
+        Arc::new(MackrlComa),
     ]
 }
 

@@ -2,9 +2,9 @@
 
 use mackrl_env::{
     declare_words,
-    serde::{Deserialize, Serialize},
     settings::{Setting, Settings, SettingsError, Violation, WrongSetting},
 };
+use serde::{Deserialize, Serialize};
 
 use crate::nn::OptimiserKind;
 
@@ -29,7 +29,7 @@ pub(super) struct Exploration {
 
 /// A section without a setting.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(crate = "mackrl_env::serde", deny_unknown_fields)]
+#[serde(deny_unknown_fields)]
 pub struct NoSettings {}
 
 impl Settings for NoSettings {

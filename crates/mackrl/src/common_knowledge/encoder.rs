@@ -292,27 +292,35 @@ impl fmt::Debug for GroupEncoder {
     }
 }
 
-/// Writes which columns of a pair's table may be chosen: *delegate* always, and every joint action whose two parts are
-/// commonly known to be available.
+/// Writes which columns of a group's table may be chosen: every division, and every joint action whose parts are all commonly known to
+/// be available.
 ///
 /// # Shapes
-/// `available_ga` \[2, A\]; `mask_c` \[1 + A·A\], column `1 + u_a·A + u_b` for the joint action `(u_a, u_b)`.
+/// `available_ga` \[G, A\]; `mask_c` \[D + A^G\]: the divisions, then the joint actions, the last member's action changing fastest. Of a
+/// pair column `1 + u_a·A + u_b` is the joint action `(u_a, u_b)`.
 ///
 /// # Panics
 /// If the lengths do not fit each other.
-pub fn joint_mask(available_ga: &[bool], mask_c: &mut [bool]) {
-    let actions = available_ga.len() / 2;
-    assert_eq!(
-        mask_c.len(),
-        1 + actions * actions,
-        "a pair's mask is [1 + A*A]"
-    );
-    let (first, second) = available_ga.split_at(actions);
-    let (delegate, joint) = mask_c.split_at_mut(1);
-    delegate[0] = true;
-    for (&first_available, row) in first.iter().zip(joint.chunks_mut(actions)) {
-        for (column, &second_available) in row.iter_mut().zip(second) {
-            *column = first_available && second_available;
+pub fn joint_mask(available_ga: &[bool], actions: usize, divisions: usize, mask_c: &mut [bool]) {
+    let (divide, joint) = mask_c.split_at_mut(divisions);
+    divide.fill(true);
+    write_joint(available_ga, actions, joint);
+}
+
+/// Writes which joint actions of the members are available.
+fn write_joint(available_ga: &[bool], actions: usize, joint: &mut [bool]) {
+    let (first, others) = available_ga.split_at(actions);
+    if others.is_empty() {
+        joint.copy_from_slice(first);
+        return;
+    }
+    assert_eq!(joint.len() % actions, 0, "a group's joint actions are A^G");
+    let rows = joint.chunks_mut(joint.len() / actions);
+    for (&is_available, row) in first.iter().zip(rows) {
+        if is_available {
+            write_joint(others, actions, row);
+        } else {
+            row.fill(false);
         }
     }
 }

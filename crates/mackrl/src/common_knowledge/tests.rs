@@ -374,7 +374,7 @@ fn a_pair_that_knows_nothing_reads_a_constant_and_can_only_delegate() {
             "{features:?}: {input_f:?}"
         );
         let mut mask_c = [true; 10];
-        joint_mask(&available_ga, &mut mask_c);
+        joint_mask(&available_ga, 3, 1, &mut mask_c);
         assert!(mask_c[0], "delegating is always possible");
         assert!(!mask_c[1..].contains(&true), "a joint action is possible");
     }
@@ -384,7 +384,7 @@ fn a_pair_that_knows_nothing_reads_a_constant_and_can_only_delegate() {
 fn the_joint_mask_is_the_outer_product_of_its_members_availability() {
     let available_ga = [true, false, true, false, true, true];
     let mut mask_c = [false; 10];
-    joint_mask(&available_ga, &mut mask_c);
+    joint_mask(&available_ga, 3, 1, &mut mask_c);
     #[rustfmt::skip]
     let expected = [
         true,
@@ -392,5 +392,15 @@ fn the_joint_mask_is_the_outer_product_of_its_members_availability() {
         false, false, false,
         false, true, true,
     ];
+    assert_eq!(mask_c, expected);
+}
+
+#[test]
+fn the_joint_mask_of_three_is_the_product_of_all() {
+    let available_ga = [true, false, true, true, false, true];
+    let mut mask_c = [false; 8];
+    joint_mask(&available_ga, 2, 0, &mut mask_c);
+    // (0, 0, 1) and (0, 1, 1).
+    let expected = [false, true, false, true, false, false, false, false];
     assert_eq!(mask_c, expected);
 }

@@ -1,20 +1,16 @@
-//! A value of each member's choice or situation, learnt backwards in time as PyMARL's critics are.
+//! A value of each member's choice or situation: a row for each member at each step.
 //!
-//! One network reads a row for each member at each step and gives a row of numbers, one of which belongs to what was done: the
-//! value of the situation, where there is one column (IAC), or that of the member's action, where there is one for each (COMA).
-//! Targets are λ-returns of a copy of the network, refreshed now and then; the last state of an episode is worth nothing.
+//! Targets are λ-returns of a copy of the network, refreshed now and then; the last state of an episode is worth nothing. One column
+//! is the value of the situation (IAC), one for each action that of the member's action (COMA).
 
 use mackrl_env::EpisodeKey;
 
-use super::{CRITIC, CriticReport, explained};
+use super::{ChoiceCritic, ChoiceCriticSettings, ChoiceRows, CriticReport, CriticState};
 use crate::{
     NotFinite,
     experience::Episode,
-    nn::{
-        FeedForward, FeedForwardTrace, FeedForwardWeights, Moments, Optimiser, OptimiserKind,
-        ParameterLayout, finite_step,
-    },
-    objectives::{ReturnSettings, lambda_returns, squared_errors},
+    nn::{FeedForwardWeights, ParameterLayout},
+    objectives::{ReturnSettings, lambda_returns},
 };
 
 /// Rows whose targets are computed together, so that what is computed of them stays in the cache.
@@ -23,20 +19,10 @@ const BLOCK_ROWS: usize = 512;
 /// Sizes of a [`MemberCritic`], and how it learns.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MemberCriticSettings {
-    /// F: length of a row.
-    pub inputs: usize,
-    /// Units of each of the two hidden layers.
-    pub hidden: usize,
-    /// C: columns that it gives for a row.
-    pub outputs: usize,
+    /// Of the network.
+    pub choices: ChoiceCriticSettings,
     /// N: members.
     pub members: usize,
-    /// How parameters follow the gradient.
-    pub optimiser: OptimiserKind,
-    /// Step size.
-    pub learning_rate: f64,
-    /// Longest gradient.
-    pub gradient_norm_max: f64,
     /// How far targets look.
     pub returns: ReturnSettings,
     /// Updates between two refreshments of the target copy.
@@ -47,15 +33,10 @@ pub struct MemberCriticSettings {
 #[derive(Debug)]
 pub struct MemberCritic {
     settings: MemberCriticSettings,
-    layout: ParameterLayout,
-    network: FeedForward,
-    parameters: Vec<f32>,
-    weights: FeedForwardWeights<f32>,
+    critic: ChoiceCritic,
     target_parameters: Vec<f32>,
     target_weights: FeedForwardWeights<f32>,
-    optimiser: Optimiser<f32>,
-    gradient: Vec<f32>,
-    trace: FeedForwardTrace<f32>,
+    target_r: Vec<f32>,
     updates: u64,
     updates_at_refresh: u64,
 }
@@ -63,39 +44,30 @@ pub struct MemberCritic {
 /// The rows of a batch of episodes, by time, then episode, then member.
 #[derive(Debug, Clone, Default)]
 pub struct MemberRows {
-    /// The first step at each time, and behind the last.
-    first_t: Vec<usize>,
+    /// What is read, and what was done.
+    pub rows: ChoiceRows,
     /// The number of each step of each episode \[B\]\[T\].
     step_bt: Vec<Vec<usize>>,
-    /// What members read \[steps · N, F\].
-    pub input_rf: Vec<f32>,
-    /// The column of what was done \[steps · N\].
-    pub column_r: Vec<usize>,
 }
 
 impl MemberRows {
     /// Makes room for these episodes: inputs are zero and all columns 0 until they are written.
     pub fn begin(&mut self, episodes: &[&Episode], settings: &MemberCriticSettings) {
         let longest = episodes.iter().map(|episode| episode.steps()).max();
-        self.first_t.clear();
         self.step_bt.clear();
         self.step_bt.resize_with(episodes.len(), Vec::new);
         let mut steps = 0;
-        for t in 0..longest.unwrap_or(0) {
-            self.first_t.push(steps);
+        let counts = (0..longest.unwrap_or(0)).map(|t| {
+            let first = steps;
             for (step_t, episode) in self.step_bt.iter_mut().zip(episodes) {
                 if t < episode.steps() {
                     step_t.push(steps);
                     steps += 1;
                 }
             }
-        }
-        self.first_t.push(steps);
-        let rows = steps * settings.members;
-        self.input_rf.clear();
-        self.input_rf.resize(rows * settings.inputs, 0.0);
-        self.column_r.clear();
-        self.column_r.resize(rows, 0);
+            (steps - first) * settings.members
+        });
+        self.rows.begin(counts, settings.choices.inputs);
     }
 
     /// The row of a member at step `t` of episode `b`.
@@ -109,41 +81,16 @@ impl MemberCritic {
     /// A critic whose initial parameters are drawn from `key`.
     #[must_use]
     pub fn new(settings: MemberCriticSettings, key: &EpisodeKey) -> Self {
-        let (layout, network) = Self::network(&settings);
-        let mut parameters = vec![0.0; layout.len()];
-        network.initialise(key, &mut parameters);
+        let critic = ChoiceCritic::new(settings.choices, key);
         Self {
-            weights: network.weights(&parameters),
-            target_parameters: parameters.clone(),
-            target_weights: network.weights(&parameters),
-            optimiser: Optimiser::new(settings.optimiser, parameters.len()),
-            gradient: vec![0.0; parameters.len()],
-            trace: FeedForwardTrace::of(&network),
             settings,
-            layout,
-            network,
-            parameters,
+            target_parameters: critic.parameters().to_vec(),
+            target_weights: critic.network.weights(critic.parameters()),
+            target_r: Vec::new(),
+            critic,
             updates: 0,
             updates_at_refresh: 0,
         }
-    }
-
-    /// How many parameters such a critic has.
-    #[must_use]
-    pub fn size(settings: &MemberCriticSettings) -> usize {
-        Self::network(settings).0.len()
-    }
-
-    fn network(settings: &MemberCriticSettings) -> (ParameterLayout, FeedForward) {
-        let mut layout = ParameterLayout::new();
-        let widths = [
-            settings.inputs,
-            settings.hidden,
-            settings.hidden,
-            settings.outputs,
-        ];
-        let network = FeedForward::with_widths(&mut layout, CRITIC, &widths);
-        (layout, network)
     }
 
     /// Its sizes, and how it learns.
@@ -155,13 +102,19 @@ impl MemberCritic {
     /// Names and shapes of the parameters.
     #[must_use]
     pub const fn layout(&self) -> &ParameterLayout {
-        &self.layout
+        self.critic.layout()
     }
 
     /// The parameters.
     #[must_use]
     pub fn parameters(&self) -> &[f32] {
-        &self.parameters
+        self.critic.parameters()
+    }
+
+    /// The targets of the latest batch \[steps · N\].
+    #[must_use]
+    pub fn target_r(&self) -> &[f32] {
+        &self.target_r
     }
 
     /// Takes other parameters.
@@ -169,17 +122,16 @@ impl MemberCritic {
     /// # Panics
     /// If there are not as many as the layout says.
     pub fn load(&mut self, parameters: &[f32]) {
-        self.network.refresh(parameters, &mut self.weights);
-        self.parameters.copy_from_slice(parameters);
+        self.critic.load(parameters);
     }
 
     /// What a checkpoint must hold.
     #[must_use]
-    pub fn state(&self) -> super::CriticState {
-        super::CriticState {
-            parameters: self.parameters.clone(),
+    pub fn state(&self) -> CriticState {
+        CriticState {
+            parameters: self.critic.parameters().to_vec(),
             target_parameters: self.target_parameters.clone(),
-            moments: self.optimiser.moments().clone(),
+            moments: self.critic.moments().clone(),
             updates: self.updates,
             updates_at_refresh: self.updates_at_refresh,
         }
@@ -189,26 +141,19 @@ impl MemberCritic {
     ///
     /// # Panics
     /// If the state is that of a critic of another size or optimiser.
-    pub fn restore(&mut self, state: super::CriticState) {
-        let super::CriticState {
-            parameters,
-            target_parameters,
-            moments,
-            updates,
-            updates_at_refresh,
-        } = state;
-        self.load(&parameters);
-        self.network
-            .refresh(&target_parameters, &mut self.target_weights);
-        self.target_parameters = target_parameters;
-        let moments: Moments<f32> = moments;
-        self.optimiser.restore(moments);
-        self.updates = updates;
-        self.updates_at_refresh = updates_at_refresh;
+    pub fn restore(&mut self, state: CriticState) {
+        self.critic.load(&state.parameters);
+        self.critic.restore_moments(state.moments);
+        let target = &state.target_parameters;
+        self.critic
+            .network
+            .refresh(target, &mut self.target_weights);
+        self.target_parameters = state.target_parameters;
+        self.updates = state.updates;
+        self.updates_at_refresh = state.updates_at_refresh;
     }
 
-    /// Learns from a batch, one optimiser step for each time from the last to the first, and writes what it gave for each row when
-    /// its step came.
+    /// Learns from a batch as [`ChoiceCritic::learn`] does, and writes what it gave for each row when its step came.
     ///
     /// # Shapes
     /// `value_rc` becomes \[steps · N, C\].
@@ -222,52 +167,44 @@ impl MemberCritic {
         value_rc: &mut Vec<f32>,
     ) -> Result<CriticReport, NotFinite> {
         if self.updates - self.updates_at_refresh >= self.settings.target_interval_updates {
-            self.target_parameters.copy_from_slice(&self.parameters);
-            self.network
-                .refresh(&self.target_parameters, &mut self.target_weights);
+            let parameters = self.critic.parameters();
+            self.target_parameters.copy_from_slice(parameters);
+            let network = &self.critic.network;
+            network.refresh(parameters, &mut self.target_weights);
             self.updates_at_refresh = self.updates;
         }
-        let target_r = self.targets(episodes, rows);
-        let MemberCriticSettings {
-            outputs, members, ..
-        } = self.settings;
-        value_rc.clear();
-        value_rc.resize(rows.column_r.len() * outputs, 0.0);
-        let mut report = CriticReport::default();
-        let times = rows.first_t.len() - 1;
-        for t in (0..times).rev() {
-            let own = rows.first_t[t] * members..rows.first_t[t + 1] * members;
-            let values = &mut value_rc[own.start * outputs..own.end * outputs];
-            let one = self.update(rows, own, &target_r, values)?;
-            report.loss += one.loss / times as f64;
-            report.gradient_norm += one.gradient_norm / times as f64;
-            report.td_error_abs += one.td_error_abs / times as f64;
-            report.target_mean += one.target_mean / times as f64;
-        }
-        let values = value_rc.chunks_exact(outputs).zip(&rows.column_r);
-        let chosen = values.map(|(value_c, &column)| &value_c[column]);
-        report.explained_variance = explained(target_r.iter().zip(chosen));
+        self.write_targets(episodes, rows);
+        let report = self.critic.learn(&rows.rows, &self.target_r, value_rc)?;
+        let times = episodes.iter().map(|episode| episode.steps()).max();
+        self.updates += times.unwrap_or(0) as u64;
         Ok(report)
     }
 
-    /// The λ-returns of all rows.
-    fn targets(&mut self, episodes: &[&Episode], rows: &MemberRows) -> Vec<f32> {
+    /// Computes the λ-returns of all rows.
+    fn write_targets(&mut self, episodes: &[&Episode], rows: &MemberRows) {
         let MemberCriticSettings {
-            inputs,
-            outputs,
+            choices,
             members,
             returns,
             ..
         } = self.settings;
-        let mut chosen_r = Vec::with_capacity(rows.column_r.len());
-        let blocks = rows.input_rf.chunks(BLOCK_ROWS * inputs);
-        for (block, columns) in blocks.zip(rows.column_r.chunks(BLOCK_ROWS)) {
-            self.trace.begin(columns.len()).copy_from_slice(block);
-            self.network.forward(&self.target_weights, &mut self.trace);
-            let values = self.trace.outputs().chunks_exact(outputs).zip(columns);
-            chosen_r.extend(values.map(|(value_c, &column)| value_c[column]));
+        let critic = &mut self.critic;
+        let mut chosen_r = Vec::with_capacity(rows.rows.len());
+        let blocks = rows.rows.input_rf.chunks(BLOCK_ROWS * choices.inputs);
+        for (block, columns) in blocks.zip(rows.rows.column_r.chunks(BLOCK_ROWS)) {
+            critic.trace.begin(columns.len()).copy_from_slice(block);
+            critic
+                .network
+                .forward(&self.target_weights, &mut critic.trace);
+            let values = critic.trace.outputs().chunks_exact(choices.outputs);
+            chosen_r.extend(
+                values
+                    .zip(columns)
+                    .map(|(value_c, &column)| value_c[column]),
+            );
         }
-        let mut target_r = vec![0.0; chosen_r.len()];
+        self.target_r.clear();
+        self.target_r.resize(chosen_r.len(), 0.0);
         let (mut value_t, mut return_t) = (Vec::new(), Vec::new());
         for (b, episode) in episodes.iter().enumerate() {
             for member in 0..members {
@@ -279,69 +216,10 @@ impl MemberCritic {
                 return_t.resize(episode.steps(), 0.0);
                 lambda_returns(returns, &episode.reward_t, &value_t, &mut return_t);
                 for (t, &return_) in return_t.iter().enumerate() {
-                    target_r[row(t)] = return_;
+                    self.target_r[row(t)] = return_;
                 }
             }
         }
-        target_r
-    }
-
-    /// One optimiser step on some rows.
-    fn update(
-        &mut self,
-        rows: &MemberRows,
-        own: std::ops::Range<usize>,
-        target_r: &[f32],
-        values: &mut [f32],
-    ) -> Result<CriticReport, NotFinite> {
-        let MemberCriticSettings {
-            inputs, outputs, ..
-        } = self.settings;
-        let (columns, targets) = (&rows.column_r[own.clone()], &target_r[own.clone()]);
-        let count = own.len() as f64;
-        self.trace
-            .begin(own.len())
-            .copy_from_slice(&rows.input_rf[own.start * inputs..own.end * inputs]);
-        self.network.forward(&self.weights, &mut self.trace);
-        let (given, gradients) = self.trace.outputs_and_gradient_mut();
-        values.copy_from_slice(given);
-        let chosen = given.chunks_exact(outputs).zip(columns);
-        let chosen: Vec<f32> = chosen.map(|(value_c, &column)| value_c[column]).collect();
-        let mut slopes = vec![0.0; chosen.len()];
-        let weight = crate::Real::from_f64(1.0 / count);
-        let errors = squared_errors(weight, [&chosen, targets], &mut slopes);
-        if !errors.absolute.is_finite() {
-            let broken = chosen.iter().position(|value| !value.is_finite());
-            let row = broken.unwrap_or(0);
-            return Err(NotFinite::new("critic.value", &[("row", row)], chosen[row]));
-        }
-        gradients.fill(0.0);
-        for ((gradient_c, &column), slope) in
-            gradients.chunks_exact_mut(outputs).zip(columns).zip(slopes)
-        {
-            gradient_c[column] = slope;
-        }
-        self.gradient.fill(0.0);
-        self.network
-            .backward(&self.weights, &mut self.trace, &mut self.gradient);
-        let gradient_norm = finite_step(
-            &mut self.optimiser,
-            &self.layout,
-            [self.settings.learning_rate, self.settings.gradient_norm_max],
-            &mut self.gradient,
-            &mut self.parameters,
-        )?;
-        self.network.refresh(&self.parameters, &mut self.weights);
-        self.updates += 1;
-        let target: f64 = targets.iter().map(|&target| f64::from(target)).sum();
-        Ok(CriticReport {
-            loss: errors.loss,
-            gradient_norm,
-            td_error_abs: errors.absolute / count,
-            target_mean: target / count,
-            // Of all rows together, which are not known here.
-            explained_variance: 0.0,
-        })
     }
 }
 
@@ -350,18 +228,22 @@ mod tests {
     use mackrl_env::Stream;
 
     use super::*;
+    use crate::nn::OptimiserKind;
 
     /// Two members whose rows say which member it is and what comes: the critic finds the discounted rewards.
     #[test]
     fn it_learns_what_each_member_can_expect() {
         let settings = MemberCriticSettings {
-            inputs: 4,
-            hidden: 16,
-            outputs: 3,
+            choices: ChoiceCriticSettings {
+                name: "critic",
+                inputs: 4,
+                hidden: 16,
+                outputs: 3,
+                optimiser: OptimiserKind::ADAM,
+                learning_rate: 3e-3,
+                gradient_norm_max: 10.0,
+            },
             members: 2,
-            optimiser: OptimiserKind::ADAM,
-            learning_rate: 3e-3,
-            gradient_norm_max: 10.0,
             returns: ReturnSettings {
                 gamma: 0.5,
                 lambda: 0.8,
@@ -381,10 +263,10 @@ mod tests {
             for t in 0..episode.steps() {
                 for member in 0..2 {
                     let row = rows.row([b, t], member, 2);
-                    rows.input_rf[row * 4 + member] = 1.0;
-                    rows.input_rf[row * 4 + 2] = b as f32;
-                    rows.input_rf[row * 4 + 3] = t as f32;
-                    rows.column_r[row] = member + t;
+                    rows.rows.input_rf[row * 4 + member] = 1.0;
+                    rows.rows.input_rf[row * 4 + 2] = b as f32;
+                    rows.rows.input_rf[row * 4 + 3] = t as f32;
+                    rows.rows.column_r[row] = member + t;
                 }
             }
         }

@@ -233,7 +233,11 @@ impl Subject<'_, '_> {
                 }
             };
             let key = &recorded.keys.choices;
-            let action_n = central.act(step, key, &altered, recorded.behaviour)?;
+            let action_n = match central.act(step, key, &altered, recorded.behaviour) {
+                // The dead see nothing and do nothing any more: everything is noise, for which a team need not be made.
+                Err(Error::Config(_)) if observations.visible(0)[agent.index()].is_empty() => break,
+                acted => acted?,
+            };
             let found = &central.computed(&altered, &action_n)[agent.index()];
             recorded.compare(Check::AlteredWorlds, step, agent, found, certificate);
         }

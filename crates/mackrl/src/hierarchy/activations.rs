@@ -148,6 +148,17 @@ impl BankActivations {
         &self.log_p_rc[row * self.columns..(row + 1) * self.columns]
     }
 
+    /// Writes the gradient of a row's logits, counted among all that were asked, from that of a few of its log-probabilities.
+    pub(crate) fn write_row_gradient(&mut self, row: usize, weights: &[(usize, f32)]) {
+        let (law, place) = (self.law(), row * self.columns..(row + 1) * self.columns);
+        law.row_gradient(
+            &self.log_p_rc[place.clone()],
+            &self.softmax_rc[place.clone()],
+            weights,
+            &mut self.trace.all_logits_gradient_mut()[place],
+        );
+    }
+
     pub(crate) const fn law(&self) -> MaskedLogSoftmax<f32> {
         MaskedLogSoftmax {
             columns: self.columns,

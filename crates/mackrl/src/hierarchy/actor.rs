@@ -13,7 +13,7 @@ use super::{
     thought,
 };
 use crate::{
-    NotFinite, Phase, Stopwatch,
+    Error, Phase, Stopwatch,
     experience::Experience,
     marginalisation::{MarginalGradient, log_likelihood_with_gradient},
     policy::{
@@ -50,6 +50,28 @@ impl TeamActor {
         tables[b].alive = living.map(EntityId::from).collect();
         tables[b].write_forced(parts, |agent| forced_action(perspective.view(b, agent)));
         tables[b].note_possible(parts, &situation.keys[b], situation.step);
+    }
+
+    /// Refuses a step at which a group of living members that can only act jointly does not commonly know who they are.
+    fn check_sight(&self, situation: Situation<'_>) -> Result<(), Error> {
+        let Controllers { parts, tables, .. } = &self.controllers;
+        let levels = parts.declaration.levels().iter().enumerate();
+        for (place, _) in levels.filter(|(_, level)| level.survives) {
+            for &b in situation.playing {
+                let table = &tables[b];
+                let known = table.known_g[place][0];
+                if !table.alive.is_subset_of(known) {
+                    return Err(Error::Config(format!(
+                        "at step {} of an episode of {} the {} living agents do not all see each other, expected a world in which they always do: \
+                         a controller of the whole team reads what the team commonly knows",
+                        situation.step,
+                        parts.spec.name,
+                        table.alive.len(),
+                    )));
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Walks down the hierarchy in environment `b` and, if recording, remembers how log p(u) depends on each choice.
@@ -111,7 +133,7 @@ impl Actor for TeamActor {
         situation: Situation<'_>,
         experience: &mut Experience,
         actions_bn: &mut [Action],
-    ) -> Result<(), NotFinite> {
+    ) -> Result<(), Error> {
         let perspective = Perspective::Everybody(situation.observations);
         for &b in situation.playing {
             self.observe(perspective, situation, b);
@@ -129,6 +151,7 @@ impl Actor for TeamActor {
             &mut experience.banks,
             &mut self.stopwatch,
         )?;
+        self.check_sight(situation)?;
         let agents = self.controllers.parts.declaration.agents();
         for &b in situation.playing {
             let action_n = &mut actions_bn[b * agents..(b + 1) * agents];

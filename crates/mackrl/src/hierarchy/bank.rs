@@ -140,7 +140,11 @@ impl Bank {
             mask.fill(true);
             return;
         };
-        joint_mask(available_ga, mask);
+        let actions = available_ga.len() / members.len();
+        if level.survives {
+            rest_the_dead(actions, available_ga);
+        }
+        joint_mask(available_ga, actions, level.divisions, mask);
         let (divide, joint) = mask.split_at_mut(level.divisions);
         match delegation {
             Delegation::Learned => {}
@@ -174,6 +178,15 @@ impl Bank {
     fn normalise(&self, input: &mut [f32]) {
         if self.normalises {
             normalise_rows(input.len(), input);
+        }
+    }
+}
+
+/// Gives members that have no action, the dead, action 0 in its place: nothing depends on it.
+fn rest_the_dead(actions: usize, available_ga: &mut [bool]) {
+    for available_a in available_ga.chunks_mut(actions) {
+        if !available_a.contains(&true) {
+            available_a[0] = true;
         }
     }
 }

@@ -126,8 +126,8 @@ impl Controllers {
         for level in 0..banks.len() {
             if let Some(weights) = &weights[level] {
                 self.write_rows(level, perspective, moment.playing, &mut banks[level]);
-                let reads_own = level == parts.declaration.alone();
-                stopwatch.lap(if reads_own {
+                let reads = parts.declaration.levels()[level].reads;
+                stopwatch.lap(if reads == Reads::OwnObservation {
                     Phase::Act
                 } else {
                     Phase::CommonKnowledge
@@ -188,7 +188,12 @@ impl Controllers {
                 let view = perspective.view(environment, agent);
                 bank.write_agent(view, table.last_action_n[agent.index()], rows.row_mut(row));
             } else {
-                let known = perspective.common_knowledge(environment, &level.groups[group]);
+                let members = &level.groups[group];
+                let known = if level.survives {
+                    perspective.common_knowledge_of_living(environment, members)
+                } else {
+                    perspective.common_knowledge(environment, members)
+                };
                 table.known_g[place][group] = known.set();
                 bank.write_group(
                     level,

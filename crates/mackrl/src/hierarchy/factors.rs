@@ -15,7 +15,7 @@ use crate::{
     experience::{Experience, Instance, Piece},
     marginalisation::pair::{PairGradient, PairRows, gradient_alone},
     nn::elementary::exponentials,
-    policy::{Parameters, Recording, TEAM},
+    policy::{Parameters, Reads, Recording, TEAM},
 };
 
 /// No row.
@@ -73,7 +73,8 @@ impl Hierarchy {
     pub fn factorises(&self) -> bool {
         let declaration = &self.parts.declaration;
         let levels = declaration.levels();
-        levels[TEAM].divisions == 1 && (levels.len() == 2 || declaration.is_pairwise())
+        let alone = levels[declaration.alone()].reads == Reads::OwnObservation;
+        levels[TEAM].divisions == 1 && alone && (levels.len() == 2 || declaration.is_pairwise())
     }
 
     /// The choices of an experience, group by group, of living agents.
@@ -201,40 +202,58 @@ impl Hierarchy {
         }));
     }
 
-    /// Writes what each agent that a factor is can expect of a value of its own action: `Σ_a p(a) v(a)`, under the parameters that the
-    /// activations belong to.
+    /// Writes what each group can expect of a value of its own choice, exploration included, under the parameters that the activations
+    /// belong to: `Σ_u q(u) v(u)`, over an agent's actions or a pair's joint actions.
     ///
     /// # Shapes
-    /// `value_a` gives \[A\] for a factor; `expected_i` becomes as long as `factors`.
+    /// `value` gives for the factor at a place \[A\] of an agent or \[A·A\] of a pair, the first member's action outermost;
+    /// `expected_i` becomes as long as `factors`.
     ///
     /// # Panics
-    /// If a factor is a pair.
+    /// If a factor is a pair of a hierarchy without pairs.
     pub fn expectations<'v>(
         &self,
         activations: &Activations,
         factors: &[Factor],
-        value_a: impl Fn(&Factor) -> &'v [f32],
+        value: impl Fn(usize) -> &'v [f32],
         expected_i: &mut Vec<f32>,
     ) {
-        let (_, agents) = self.parts.split(activations);
-        let mut p_a = vec![0.0; agents.law().columns];
+        let (pairs, agents) = self.parts.split(activations);
+        let actions = agents.law().columns;
+        let [mut first, mut second] = [vec![0.0; actions], vec![0.0; actions]];
+        let mut joint = vec![0.0; pairs.map_or(0, |pairs| pairs.law().columns)];
         expected_i.clear();
-        expected_i.extend(factors.iter().map(|factor| {
-            assert!(factor.second.is_none(), "an agent's own action");
-            exponentials(agents.log_p(factor.rows[0]), &mut p_a);
-            let terms = p_a.iter().zip(value_a(factor));
-            terms.map(|(p, value)| p * value).sum::<f32>()
+        expected_i.extend(factors.iter().enumerate().map(|(place, factor)| {
+            let log_p = factor.rows.map(|row| match row {
+                NONE => &[][..],
+                row => agents.log_p(row),
+            });
+            exponentials(log_p[0], &mut first);
+            if factor.second.is_none() {
+                let terms = first.iter().zip(value(place));
+                return terms.map(|(p, value)| p * value).sum::<f32>();
+            }
+            let pairs = pairs.expect("a pair has a controller");
+            let log_joint = pairs.log_p(factor.pair_row);
+            exponentials(log_p[1], &mut second);
+            exponentials(log_joint, &mut joint);
+            let rows = PairRows {
+                pair: [&joint, log_joint],
+                first: [&first, log_p[0]],
+                second: [&second, log_p[1]],
+            };
+            rows.expectation(value(place))
         }));
     }
 
     /// Adds the gradient of `Σ_i d_log_q_i log q_i + entropy_weight Σ_i H(q_i)` to `gradient`, and gives `Σ_i H(q_i)`. The
-    /// activations are used up.
+    /// activations are used up. Where exploration is mixed into choices, it is part of q, whose entropy is not computed then: 0.
     ///
     /// # Shapes
     /// `d_log_q_i` as `factors`, `gradient` as the layout.
     ///
     /// # Panics
-    /// If the activations are spent or belong to other parameters.
+    /// If the activations are spent or belong to other parameters, or if the entropy of choices that explore has a weight.
     pub fn backward_factors(
         &self,
         parameters: &Parameters,
@@ -253,6 +272,12 @@ impl Hierarchy {
             d_log_q_i.len(),
             "a derivative of each factor"
         );
+        let mut banks = activations.banks.iter().flatten();
+        let explores = banks.any(|bank| bank.epsilon > 0.0);
+        assert!(
+            !explores || entropy_weight == 0.0,
+            "no weight of the entropy of choices that explore"
+        );
         let parts = &*self.parts;
         let alone = parts.declaration.alone();
         for own in activations.banks.iter_mut().flatten() {
@@ -266,6 +291,10 @@ impl Hierarchy {
         let mut second_gradient = vec![0.0; columns];
         let mut first_gradient = vec![0.0; columns];
         for (factor, &weight) in factors.iter().zip(d_log_q_i) {
+            if explores {
+                write_explored(pairs.as_deref_mut(), agents, factor, weight);
+                continue;
+            }
             let weights = [weight, entropy_weight];
             let place = |row: usize| row * columns..(row + 1) * columns;
             if factor.second.is_none() {
@@ -321,6 +350,28 @@ impl Parts {
         let pairs = (alone > PAIRS).then(|| activations.banks[PAIRS].as_ref());
         (pairs.flatten(), agents.expect("agents have controllers"))
     }
+}
+
+/// Writes the gradient of `weight · log q` with respect to the logits of a factor's rows, into whose choices exploration is mixed.
+fn write_explored(
+    pairs: Option<&mut BankActivations>,
+    agents: &mut BankActivations,
+    factor: &Factor,
+    weight: f32,
+) {
+    let [a, b] = factor.actions;
+    if factor.second.is_none() {
+        agents.write_row_gradient(factor.rows[0], &[(a, weight)]);
+        return;
+    }
+    let pairs = pairs.expect("a pair has a controller");
+    let [joint, delegated] = pair_rows(pairs, agents, factor)
+        .posteriors(factor.actions)
+        .map(|posterior| weight * posterior);
+    let column = 1 + a * agents.law().columns + b;
+    pairs.write_row_gradient(factor.pair_row, &[(0, delegated), (column, joint)]);
+    agents.write_row_gradient(factor.rows[0], &[(a, delegated)]);
+    agents.write_row_gradient(factor.rows[1], &[(b, delegated)]);
 }
 
 /// The rows of a pair and its members.

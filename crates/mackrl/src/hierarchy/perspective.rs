@@ -48,6 +48,22 @@ impl<'a> Perspective<'a> {
             }
         }
     }
+
+    /// What those members of `group` commonly know that live in environment `b`. To one agent alone, whoever is out of its sight is
+    /// dead, which is true where the living always see each other.
+    pub(crate) fn common_knowledge_of_living(
+        self,
+        b: usize,
+        group: &[AgentId],
+    ) -> KnownEntities<'a> {
+        let lives = |agent: AgentId| match self {
+            Self::Everybody(observations) => is_alive(observations.local_view(b, agent)),
+            Self::One(view, _) => view.seen().set().contains(agent),
+        };
+        let members = group.iter().copied();
+        let living: Vec<AgentId> = members.filter(|&agent| lives(agent)).collect();
+        self.common_knowledge(b, if living.is_empty() { group } else { &living })
+    }
 }
 
 /// Whether the agent still acts. The dead see nothing, not even themselves; their one available action needs no network.

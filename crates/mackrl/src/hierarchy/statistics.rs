@@ -109,13 +109,14 @@ impl HierarchyStatistics {
                 self.note_entropy(decision, part);
             }
         }
-        for group in 0..declaration.agents() {
-            let agent = Part {
+        let last = &declaration.levels()[alone];
+        for group in 0..last.groups.len() {
+            let part = Part {
                 level: alone,
                 group,
             };
-            if decision.lives(agent) {
-                self.note_entropy(decision, agent);
+            if last.survives || decision.lives(part) {
+                self.note_entropy(decision, part);
             }
         }
     }

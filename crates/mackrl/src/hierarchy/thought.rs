@@ -8,7 +8,7 @@ use crate::{
     marginalisation::{MarginalGradient, log_likelihood_with_gradient},
     policy::{
         AgentThought, Division, GroupChoice, GroupThought, JointOption, PairThought, Part,
-        PartitionThought, TEAM, Thought, most_probable,
+        PartitionThought, TEAM, TeamOption, Thought, most_probable,
     },
 };
 
@@ -52,6 +52,10 @@ pub(super) fn describe(
             {
                 continue;
             }
+            if level.survives {
+                thought.groups.push(whole_team(decision, part, action_n));
+                continue;
+            }
             match (level.size(), declaration.members(part)) {
                 (1, &[agent]) => {
                     let taken = action_n[agent.index()];
@@ -68,6 +72,7 @@ pub(super) fn describe(
                     members: members.to_vec(),
                     known: decision.known(part).iter().collect(),
                     divisions: divisions(decision, part, posterior),
+                    joint: Vec::new(),
                     chosen: decision.path.choice(part),
                 }),
             }
@@ -102,6 +107,35 @@ fn divisions(
             posterior,
         })
         .collect()
+}
+
+/// The living members of a team that acts as one, and what they could do.
+fn whole_team(decision: &Decision<'_>, part: Part, action_n: &[Action]) -> GroupThought {
+    let declaration = decision.table.declaration();
+    let (level, actions) = (&declaration.levels()[part.level], declaration.actions());
+    let all = declaration.members(part);
+    let members = all.iter().copied();
+    let members: Vec<AgentId> = members.filter(|&a| decision.alive.contains(a)).collect();
+    let column = level.column(part.group, actions, action_n);
+    let column = column.expect("the team acts jointly");
+    let options = most_probable(decision.table.row(part), column).into_iter();
+    let action = |joint: usize, member: &AgentId| {
+        let later = all.iter().filter(|other| *other > member).count();
+        let joint = (0..later).fold(joint, |joint, _| joint / actions);
+        Action::new(joint % actions)
+    };
+    GroupThought {
+        known: decision.known(part).iter().collect(),
+        divisions: Vec::new(),
+        joint: options
+            .map(|(joint, probability)| TeamOption {
+                actions: members.iter().map(|member| action(joint, member)).collect(),
+                probability,
+            })
+            .collect(),
+        chosen: None,
+        members,
+    }
 }
 
 fn pair(

@@ -1,4 +1,5 @@
-//! The marginal of one pair, `q(u) = π(u) + π(delegate) π_a(u_a) π_b(u_b)`: its logarithm, its entropy, and the way back to logits.
+//! The marginal of one pair, `q(u) = π(u) + π(delegate) π_a(u_a) π_b(u_b)`: its logarithm, its entropy, what it can expect, and the
+//! way back to logits.
 //!
 //! Where one partition is in force, p(u) is the product of its groups' marginals, and a learner may weigh each group by itself.
 //! The entropy is that of the *marginal*, over all A² joint actions: a bonus on the pair controller's own choices would reward it
@@ -43,6 +44,37 @@ impl<F: Element> PairRows<'_, F> {
         log_sum_exp([joint, delegated])
     }
 
+    /// How likely each of both ways to the members' actions is, given that they led there: jointly, and by delegation. These are the
+    /// derivatives of log q(u) with respect to log π(u), and to log π(delegate), log `π_a(u_a)` and log `π_b(u_b)`; 0 if q(u) = 0.
+    #[must_use]
+    pub fn posteriors(&self, actions: [usize; 2]) -> [F; 2] {
+        let (joint, delegated) = self.terms(actions);
+        let total = log_sum_exp([joint, delegated]);
+        [share(joint, total), share(delegated, total)]
+    }
+
+    /// What the pair can expect of a value of its joint action: exact, a sum over all of them.
+    ///
+    /// # Shapes
+    /// `value_ab` \[A·A\], the first member's action outermost.
+    ///
+    /// # Equation
+    /// `Σ_u q(u) v(u) = Σ_ab (π(a, b) + π(delegate) π_a(a) π_b(b)) v(a, b)`
+    #[must_use]
+    pub fn expectation(&self, value_ab: &[F]) -> F {
+        let ([pair, _], [first, _], [second, _]) = (self.pair, self.first, self.second);
+        let rows = value_ab.chunks_exact(second.len());
+        let rows = rows.zip(pair[1..].chunks_exact(second.len()));
+        let terms = rows.zip(first).map(|((value_b, joint_b), &p_a)| {
+            let delegated = pair[0] * p_a;
+            let columns = value_b.iter().zip(joint_b).zip(second);
+            columns
+                .map(|((&value, &joint), &p_b)| (joint + delegated * p_b) * value)
+                .sum::<F>()
+        });
+        terms.sum()
+    }
+
     /// The logarithms of the joint way to u and of the delegated one.
     fn terms(&self, [a, b]: [usize; 2]) -> (F, F) {
         let [_, pair] = self.pair;
@@ -72,15 +104,13 @@ impl<F: Element> PairRows<'_, F> {
     ) -> F {
         let [weight, entropy_weight] = weights;
         let entropy = self.entropy_gradient(entropy_weight, log_q, to.pair, [to.first, to.second]);
-        let (joint, delegated) = self.terms(actions);
-        let total = log_sum_exp([joint, delegated]);
+        let [joint, delta] = self.posteriors(actions);
         let [a, b] = actions;
-        let delta = share(delegated, total);
         for (gradient, &p) in to.pair.iter_mut().zip(self.pair[0]) {
             *gradient += -weight * p;
         }
         to.pair[0] += weight * delta;
-        to.pair[1 + a * self.first[0].len() + b] += weight * share(joint, total);
+        to.pair[1 + a * self.first[0].len() + b] += weight * joint;
         for (gradient, p, action) in [(to.first, self.first[0], a), (to.second, self.second[0], b)]
         {
             let weight = weight * delta;
@@ -287,6 +317,67 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn posteriors_are_the_derivatives_of_log_q() {
+        let logits = logits();
+        with_rows(&logits, |rows| {
+            for u in 0..ACTIONS * ACTIONS {
+                let actions = [u / ACTIONS, u % ACTIONS];
+                // log q is a function of logarithms of probabilities, each of which can be moved by itself.
+                let moved = |place: usize, step: f64| {
+                    let [mut pair, mut first, mut second] =
+                        [rows.pair, rows.first, rows.second].map(|[_, log_p]| log_p.to_vec());
+                    match place {
+                        0 => pair[1 + u] += step,
+                        1 => pair[0] += step,
+                        2 => first[actions[0]] += step,
+                        _ => second[actions[1]] += step,
+                    }
+                    let moved = PairRows {
+                        pair: [rows.pair[0], &pair],
+                        first: [rows.first[0], &first],
+                        second: [rows.second[0], &second],
+                    };
+                    moved.log_q(actions)
+                };
+                let [joint, delegated] = rows.posteriors(actions);
+                if rows.log_q(actions) == f64::NEG_INFINITY {
+                    assert_eq!([joint, delegated], [0.0, 0.0]);
+                    continue;
+                }
+                let all = [joint, delegated, delegated, delegated];
+                for (place, found) in all.into_iter().enumerate() {
+                    let slope = (moved(place, 1e-6) - moved(place, -1e-6)) / 2e-6;
+                    assert!((found - slope).abs() < 1e-9, "{u} {place}: {found} {slope}");
+                }
+            }
+        });
+    }
+
+    /// The counterfactual baseline of a pair is a literal sum over its joint actions; as two agents that choose by themselves, it is a
+    /// sum over both, whose order does not matter.
+    #[test]
+    fn what_a_pair_expects_is_the_sum_over_its_joint_actions() {
+        let value = |u: usize| (3.0 * u as f64).sin() - 0.4;
+        let values: Vec<f64> = (0..ACTIONS * ACTIONS).map(value).collect();
+        let mut logits = logits();
+        let sum = |q: &[f64]| q.iter().zip(&values).map(|(q, v)| q * v).sum::<f64>();
+        let found = with_rows(&logits, |rows| rows.expectation(&values));
+        let expected = sum(&literal(&logits));
+        assert!((found - expected).abs() < 1e-14, "{found} {expected}");
+
+        logits[0][1..].fill(f64::NEG_INFINITY);
+        let found = with_rows(&logits, |rows| rows.expectation(&values));
+        let [[a, _], [b, _]] = [&logits[1], &logits[2]].map(|row| softmax(row));
+        let of_first = |i: usize| {
+            (0..ACTIONS)
+                .map(|j| b[j] * values[i * ACTIONS + j])
+                .sum::<f64>()
+        };
+        let expected: f64 = (0..ACTIONS).map(|i| a[i] * of_first(i)).sum();
+        assert!((found - expected).abs() < 1e-14, "{found} {expected}");
     }
 
     #[test]

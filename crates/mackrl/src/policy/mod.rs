@@ -27,11 +27,11 @@ pub use tally::Tally;
 pub(crate) use thought::most_probable;
 pub use thought::{
     AgentThought, GroupChoice, GroupThought, JointOption, PairThought, PartitionThought,
-    SoloOption, Thought,
+    SoloOption, TeamOption, Thought,
 };
 pub use walk::{Path, Sampler};
 
-use crate::{NotFinite, Stopwatch, experience::Experience, nn::ParameterLayout};
+use crate::{Error, Stopwatch, experience::Experience, nn::ParameterLayout};
 
 /// How a controller turns its distribution into a choice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -155,14 +155,15 @@ pub trait Actor: Send {
     /// `actions_bn` \[B, N\]; rows of environments that have left are not touched.
     ///
     /// # Errors
-    /// [`NotFinite`] if a controller's logit is not finite: there is nothing to choose from then.
+    /// [`Error::NotFinite`] if a controller's logit is not finite: there is nothing to choose from then. [`Error::Config`] if the
+    /// policy is not made for such a situation.
     fn act(
         &mut self,
         parameters: &Parameters,
         situation: Situation<'_>,
         experience: &mut Experience,
         actions_bn: &mut [Action],
-    ) -> Result<(), NotFinite>;
+    ) -> Result<(), Error>;
 
     /// Whether what it leaves is learnt from by what each agent observed, the observations after the last step included, so that
     /// episodes recorded for learning have to hold it.

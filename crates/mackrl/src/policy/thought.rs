@@ -16,7 +16,7 @@ pub struct Thought {
     /// Index of the partition that was chosen.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chosen: Option<usize>,
-    /// Every group that divides further after the team did and before pairs act, such as fours.
+    /// Every group that divides further after the team did and before pairs act, such as fours; or the whole team, where it acts as one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub groups: Vec<GroupThought>,
     /// Every pair of living agents that some partition can contain.
@@ -42,7 +42,7 @@ pub struct PartitionThought {
     pub posterior: f32,
 }
 
-/// What the controller of a group computed that divides.
+/// What the controller of a group computed that divides, or of a whole team that acts as one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GroupThought {
@@ -51,7 +51,11 @@ pub struct GroupThought {
     /// What they commonly know.
     pub known: Vec<EntityId>,
     /// The ways in which it may divide.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub divisions: Vec<PartitionThought>,
+    /// Of a team that acts as one: its most probable joint actions, and the one that was taken.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub joint: Vec<TeamOption>,
     /// The way that it chose; absent if it was not asked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chosen: Option<usize>,
@@ -95,6 +99,16 @@ pub enum GroupChoice {
 pub struct JointOption {
     /// The actions of the lower and the higher member.
     pub actions: [Action; 2],
+    /// Its probability.
+    pub probability: f32,
+}
+
+/// One joint action that a whole team could take.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TeamOption {
+    /// The actions of its living members, in their order.
+    pub actions: Vec<Action>,
     /// Its probability.
     pub probability: f32,
 }

@@ -4,6 +4,7 @@
     reason = "every test file includes this module and uses a part of it"
 )]
 
+pub(crate) mod learner;
 pub(crate) mod team;
 
 use mackrl::{

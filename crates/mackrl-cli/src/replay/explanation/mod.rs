@@ -3,7 +3,7 @@
 mod only;
 mod text;
 
-use mackrl::policy::{GroupChoice, PairThought, Thought};
+use mackrl::policy::{GroupChoice, GroupThought, PairThought, Thought};
 use mackrl_env::{Action, AgentId, EntityId, EntitySet};
 use mackrl_run::replay::{GroupKnowledge, Summary, living_groups};
 use serde::Serialize;
@@ -73,6 +73,9 @@ struct Taken {
 #[derive(Debug, Serialize)]
 struct Controllers {
     partitions: Vec<Partition>,
+    /// The whole team, where it acts as one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    team: Option<Team>,
     pairs: Vec<Pair>,
     agents: Vec<Agent>,
     /// The choices on the way to the joint action.
@@ -99,6 +102,12 @@ struct Pair {
     joint: Vec<Entry>,
     posterior_joint: f32,
     posterior_delegate: f32,
+}
+
+#[derive(Debug, Serialize)]
+struct Team {
+    members: Vec<String>,
+    joint: Vec<Entry>,
 }
 
 #[derive(Debug, Serialize)]
@@ -247,6 +256,9 @@ impl Writer<'_> {
                     is_chosen: thought.chosen == Some(index),
                 })
                 .collect(),
+            team: (thought.groups.iter())
+                .find(|group| !group.joint.is_empty())
+                .map(|group| self.team(group, taken)),
             pairs: pairs.map(|pair| self.pair(pair, taken)).collect(),
             agents: agents
                 .map(|agent| Agent {
@@ -275,9 +287,28 @@ impl Writer<'_> {
         groups.iter().map(name).collect::<Vec<_>>().join(" ")
     }
 
-    fn joint_action(&self, members: [AgentId; 2], actions: [Action; 2]) -> String {
-        let names = [0, 1].map(|i| self.opened.names.action(members[i], actions[i]));
-        names.join(" + ")
+    fn joint_action(&self, members: &[AgentId], actions: &[Action]) -> String {
+        let each = members.iter().zip(actions);
+        let names = each.map(|(member, action)| self.opened.names.action(*member, *action));
+        names.collect::<Vec<_>>().join(" + ")
+    }
+
+    fn team(&self, team: &GroupThought, taken: impl Fn(AgentId) -> Action) -> Team {
+        let own: Vec<Action> = team.members.iter().map(|member| taken(*member)).collect();
+        Team {
+            members: team
+                .members
+                .iter()
+                .map(|agent| self.agent(*agent))
+                .collect(),
+            joint: (team.joint.iter())
+                .map(|option| Entry {
+                    action: self.joint_action(&team.members, &option.actions),
+                    probability: option.probability,
+                    is_taken: option.actions == own,
+                })
+                .collect(),
+        }
     }
 
     fn pair(&self, pair: &PairThought, taken: impl Fn(AgentId) -> Action) -> Pair {
@@ -288,7 +319,7 @@ impl Writer<'_> {
             delegate_probability: pair.delegate,
             joint: (pair.joint.iter())
                 .map(|option| Entry {
-                    action: self.joint_action(pair.members, option.actions),
+                    action: self.joint_action(&pair.members, &option.actions),
                     probability: option.probability,
                     is_taken: option.actions == own,
                 })
@@ -307,6 +338,15 @@ impl Writer<'_> {
             choice: self.groups(&living_groups(thought, partition)),
             probability: partition.probability,
         }));
+        let teams = thought.groups.iter().map(|group| self.team(group, taken));
+        path.extend(teams.filter_map(|team| {
+            let option = team.joint.into_iter().find(|option| option.is_taken)?;
+            Some(Chosen {
+                controller: team.members.join(", "),
+                choice: option.action,
+                probability: option.probability,
+            })
+        }));
         let mut together = EntitySet::EMPTY;
         for pair in &thought.pairs {
             let Some(choice) = pair.choice else { continue };
@@ -317,7 +357,7 @@ impl Writer<'_> {
                     let mut options = pair.joint.iter();
                     let option = options.find(|option| option.actions == actions);
                     together = together.union(pair.members.into_iter().collect());
-                    let name = self.joint_action(pair.members, actions);
+                    let name = self.joint_action(&pair.members, &actions);
                     (name, option.map_or(0.0, |option| option.probability))
                 }
             };

@@ -41,6 +41,8 @@ impl Explanation {
 
 impl Controllers {
     fn keep(&mut self, about: &About) {
+        let team = self.team.take();
+        self.team = team.filter(|team| about.concerns(&team.members));
         self.pairs.retain(|pair| about.concerns(&pair.members));
         self.agents.retain(|agent| about.concerns(&[&agent.agent]));
         self.path.retain(|chosen| {

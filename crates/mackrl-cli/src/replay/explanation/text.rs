@@ -134,20 +134,29 @@ impl Controllers {
             rows.extend(and_others("", &others, |partition| partition.probability));
             out.write_str(&indented(&output::table(&rows)))?;
         }
+        if let Some(team) = &self.team {
+            writeln!(out, "\nThe whole team (> was taken)")?;
+            let rows = entries(&team.members.join(", "), &team.joint, |option| {
+                option.is_taken
+            });
+            out.write_str(&indented(&output::table(&rows)))?;
+        }
         if !self.pairs.is_empty() {
             writeln!(out, "\nPairs (> was taken)")?;
             let rows: Vec<Vec<String>> = self.pairs.iter().flat_map(Pair::rows).collect();
             out.write_str(&indented(&output::table(&rows)))?;
         }
-        writeln!(
-            out,
-            "\nAgents alone (> was taken by the agent, jointly or alone)"
-        )?;
-        let rows = self
-            .agents
-            .iter()
-            .flat_map(|agent| entries(&agent.agent, &agent.options, |option| option.is_taken));
-        out.write_str(&indented(&output::table(&rows.collect::<Vec<_>>())))?;
+        if !self.agents.is_empty() {
+            writeln!(
+                out,
+                "\nAgents alone (> was taken by the agent, jointly or alone)"
+            )?;
+            let rows = self
+                .agents
+                .iter()
+                .flat_map(|agent| entries(&agent.agent, &agent.options, |option| option.is_taken));
+            out.write_str(&indented(&output::table(&rows.collect::<Vec<_>>())))?;
+        }
         writeln!(out, "\nThe way that was taken")?;
         let mut rows: Vec<Vec<String>> = (self.path.iter())
             .map(|chosen| {

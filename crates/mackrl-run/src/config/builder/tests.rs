@@ -87,7 +87,7 @@ fn a_wrong_type_is_named_with_its_place_and_what_was_expected() {
     );
     assert_eq!(
         message(file("[algorithm]\nname = \"maddpg\"\n")),
-        "run.toml:2:8: `algorithm.name` is \"maddpg\", expected `mackrl`, `central-v`, `mackrl-ppo`, `mappo`, `ippo`, `iql`, `vdn`, `qmix`, `iac` or `coma`"
+        "run.toml:2:8: `algorithm.name` is \"maddpg\", expected `mackrl`, `central-v`, `jal`, `mackrl-ppo`, `mappo`, `ippo`, `iql`, `vdn`, `qmix`, `iac`, `coma` or `mackrl-coma`"
     );
     assert_eq!(
         message(builder().set("run.seed=-1")),

@@ -5,8 +5,11 @@ use crate::{
 };
 
 fn config(algorithm: &str) -> Config {
+    // A team that acts as one has to see itself.
+    let sight = if algorithm == "jal" { 64 } else { 9 };
     let settings = [
         &format!("algorithm.name={algorithm}"),
+        &format!("env.sight_range={sight}"),
         "algorithm.hidden=5",
         "algorithm.environments=7",
         "algorithm.target_interval_updates=13",
@@ -122,8 +125,8 @@ fn a_run_that_goes_on_does_not_do_so_without_its_memory() {
 }
 
 #[test]
-fn agents_with_advantages_of_their_own_resume_as_well() {
-    for algorithm in ["iac", "coma"] {
+fn groups_with_advantages_of_their_own_resume_as_well() {
+    for algorithm in ["iac", "coma", "mackrl-coma", "jal"] {
         let config = config(algorithm);
         let whole = train(&config, &[1], u64::MAX);
         assert!(train(&config, &[2, 1], 2) == whole, "{algorithm}");

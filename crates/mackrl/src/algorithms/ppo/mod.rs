@@ -208,7 +208,7 @@ fn parts(table: &toml::Table, team: Team<'_>) -> Result<(Hierarchy, PpoSettings,
     )?;
     if settings.partitions == PartitionChoice::RoundRobin {
         let hold = usize::try_from(settings.hold_steps_env).unwrap_or(usize::MAX);
-        declaration = declaration.with_partitions_held(hold, settings.memory());
+        declaration = declaration.with_partitions_held(hold, settings.pair_memory.into());
     }
     declaration = declaration.with_delegation_logit(settings.delegation_logit);
     let own = HierarchySettings {

@@ -188,12 +188,13 @@ impl MackrlPpoSettings {
             ),
         ])))
     }
+}
 
-    /// How long pairs remember.
-    pub(super) const fn memory(&self) -> Memory {
-        match self.pair_memory {
-            PairMemory::Formed => Memory::WhileFormed,
-            PairMemory::Episode => Memory::Episode,
+impl From<PairMemory> for Memory {
+    fn from(memory: PairMemory) -> Self {
+        match memory {
+            PairMemory::Formed => Self::WhileFormed,
+            PairMemory::Episode => Self::Episode,
         }
     }
 }

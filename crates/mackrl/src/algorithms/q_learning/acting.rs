@@ -11,7 +11,7 @@ use mackrl_env::{
 
 use super::choice::Choice;
 use crate::{
-    NotFinite, Phase, Stopwatch,
+    Error, NotFinite, Phase, Stopwatch,
     experience::Experience,
     nn::{
         NetworkSizes, ParameterLayout, RecurrentNetwork, RecurrentWeights, Retention, Trace,
@@ -325,7 +325,7 @@ impl Actor for TeamActor {
         situation: Situation<'_>,
         experience: &mut Experience,
         actions_bn: &mut [Action],
-    ) -> Result<(), NotFinite> {
+    ) -> Result<(), Error> {
         let (agents, actions) = (self.rows.parts.sizes.agents, self.rows.parts.sizes.actions);
         let everybody = || (0..agents).map(AgentId::new);
         let view = |b: usize, agent| situation.observations.local_view(b, agent);
@@ -342,7 +342,7 @@ impl Actor for TeamActor {
                 ("agent", row % agents),
                 ("action", index % actions),
             ];
-            return Err(NotFinite::new("action value", &place, values[index]));
+            return Err(NotFinite::new("action value", &place, values[index]).into());
         }
         self.rows
             .choose(situation.step, situation.behaviour, |b| situation.keys[b]);

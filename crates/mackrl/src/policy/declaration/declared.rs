@@ -1,4 +1,4 @@
-//! The hierarchies that are declared: that of the paper, one with fours, and none.
+//! The hierarchies that are declared: that of the paper, one with fours, agents alone, and the whole team as one.
 
 use mackrl_env::AgentId;
 
@@ -102,6 +102,7 @@ impl Declaration {
             explores: false,
             delegation_logit: 0.0,
             memory: Memory::Episode,
+            survives: false,
             active: Vec::new(),
         };
         let mut team = team(agents, divisions);
@@ -121,6 +122,43 @@ impl Declaration {
         let parts = (0..agents).map(|group| Part { level: 1, group }).collect();
         let levels = vec![team(agents, vec![Division { parts }]), alone(agents)];
         Self::new([agents, actions], levels, None, false)
+    }
+
+    /// Most joint actions of [`Declaration::whole_team`]: its controller has an output for each.
+    pub const JOINT_ACTIONS_MAX: usize = 4096;
+
+    /// The number of joint actions of N agents with A actions each, A to the power of N, if there are not too many for one
+    /// controller.
+    #[must_use]
+    pub fn joint_actions([agents, actions]: [usize; 2]) -> Option<usize> {
+        let mut factors = std::iter::repeat_n(actions, agents);
+        let count = factors.try_fold(1_usize, usize::checked_mul)?;
+        (count <= Self::JOINT_ACTIONS_MAX).then_some(count)
+    }
+
+    /// One controller of the whole team, which takes a joint action on what the team commonly knows, and nothing below it: joint-action
+    /// learning. It is made for worlds in which all living members always see each other.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if there are more than [`JOINT_ACTIONS_MAX`](Self::JOINT_ACTIONS_MAX) joint actions.
+    pub fn whole_team([agents, actions]: [usize; 2]) -> Result<Self, Error> {
+        if Self::joint_actions([agents, actions]).is_none() {
+            return Err(Error::Config(format!(
+                "{agents} agents with {actions} actions each have too many joint actions for one controller, expected at most {}",
+                Self::JOINT_ACTIONS_MAX
+            )));
+        }
+        let part = Part { level: 1, group: 0 };
+        let division = Division { parts: vec![part] };
+        let together = Level {
+            name: "team_controller",
+            groups: vec![(0..agents).map(AgentId::new).collect()],
+            reads: Reads::CommonKnowledge,
+            survives: true,
+            ..alone(0)
+        };
+        let levels = vec![team(agents, vec![division]), together];
+        Ok(Self::new([agents, actions], levels, None, false))
     }
 
     fn new(
@@ -174,6 +212,7 @@ fn team(agents: usize, divisions: Vec<Division>) -> Level {
         explores: false,
         delegation_logit: 0.0,
         memory: Memory::Episode,
+        survives: false,
         active: Vec::new(),
     }
 }
@@ -202,6 +241,7 @@ fn pairs(agents: usize, below: usize, delegation: Delegation) -> Level {
         explores: true,
         delegation_logit: 0.0,
         memory: Memory::Episode,
+        survives: false,
         active: Vec::new(),
     }
 }
@@ -218,6 +258,7 @@ fn alone(agents: usize) -> Level {
         explores: true,
         delegation_logit: 0.0,
         memory: Memory::Episode,
+        survives: false,
         active: Vec::new(),
     }
 }
@@ -276,6 +317,21 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_whole_team_has_one_controller_unless_its_joint_actions_are_too_many() {
+        let declaration = Declaration::whole_team([3, 9]).unwrap();
+        let [_, together] = declaration.levels() else {
+            panic!("two levels");
+        };
+        assert_eq!((together.groups.len(), together.columns(9)), (1, 729));
+        let actions: Vec<Action> = [2, 0, 5].map(Action::new).to_vec();
+        assert_eq!(together.column(0, 9, &actions), Some(2 * 81 + 5));
+        assert_eq!(Declaration::joint_actions([4, 8]), Some(4096));
+        assert_eq!(Declaration::joint_actions([64, 9]), None);
+        let refused = Declaration::whole_team([5, 11]).unwrap_err().to_string();
+        assert!(refused.contains("expected at most 4096"), "{refused}");
     }
 
     #[test]

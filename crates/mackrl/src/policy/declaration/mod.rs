@@ -121,6 +121,9 @@ pub struct Level {
     pub delegation_logit: f64,
     /// How long its controllers remember.
     pub memory: Memory,
+    /// Whether a group goes on as its living members when others die: they know what the living commonly know, and what the dead would
+    /// do counts as action 0. Otherwise a group with a dead member commonly knows nothing.
+    pub survives: bool,
     /// Groups that some division of an earlier level contains, ascending.
     pub active: Vec<usize>,
 }
@@ -188,7 +191,7 @@ impl Level {
     /// dead agent.
     #[must_use]
     pub const fn is_forced_by_death(&self) -> bool {
-        self.divisions <= 1
+        self.divisions <= 1 && !self.survives
     }
 
     /// The name of the random number that decides for `group`.
@@ -203,7 +206,6 @@ impl Level {
 
     fn joint_actions(&self, actions: usize) -> usize {
         match self.acts {
-            // Sizes are at most 2 where groups act jointly.
             Some(_) => (0..self.size()).fold(1, |product, _| product * actions),
             None => 0,
         }
@@ -229,7 +231,7 @@ impl Declaration {
         &self.levels
     }
 
-    /// The level of single agents.
+    /// The last level: that of single agents, or the whole team's where no agent acts by itself.
     #[must_use]
     pub const fn alone(&self) -> usize {
         self.levels.len() - 1

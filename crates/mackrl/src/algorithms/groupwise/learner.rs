@@ -1,35 +1,58 @@
-//! The learner of IAC and COMA.
+//! The learner of IAC, COMA and MACKRL-COMA.
 
 use std::marker::PhantomData;
 
 use mackrl_env::{EnvironmentSpec, EpisodeKey, Stream};
 
-use super::{Advantage, AgentwiseSettings, Judge};
+use super::{
+    Advantage, GroupwiseSettings, Judge,
+    reading::{read_members, read_pairs},
+    shard::{Shard, Shared, Values},
+};
 use crate::{
     Error, NotFinite, Phase, Real, Stopwatch,
-    algorithms::{Algorithm, AlgorithmState, StoredState, Team, state::read_actor_critic},
-    common_knowledge::CommonKnowledgeFeatures,
-    critics::{MemberCritic, MemberCriticSettings, MemberRows},
+    algorithms::{
+        Algorithm, AlgorithmState, StoredState, Team,
+        state::{read_actor_critic, read_moments},
+    },
+    critics::{
+        ChoiceCritic, ChoiceRows, CriticReport, MemberCritic, MemberCriticSettings, MemberRows,
+    },
     experience::{Episode, Piece},
-    hierarchy::{Factor, FactorWorkspace, Hierarchy, HierarchySettings, NetworkStyle, Weighing},
-    nn::{Optimiser, ParameterLayout, finite_step, first_not_finite},
-    objectives::{ReturnSettings, generalised_advantages, policy_gradient},
+    hierarchy::{Hierarchy, Weighing},
+    nn::{Optimiser, ParameterLayout, finite_step},
+    objectives::{ReturnSettings, generalised_advantages},
     parallel::for_each_in_parallel,
-    policy::{Behaviour, Declaration, Parameters, Policy, Tally},
+    policy::{Behaviour, Parameters, Policy, Tally},
 };
 
-/// What is reported.
+/// What is reported, first of all of pairs.
 const METRICS: &[(&str, &str)] = &[
+    (
+        "choices_of_pairs",
+        "share of the groups' choices in a batch that are a pair's: it commonly knew a joint action",
+    ),
+    (
+        "pair_critic_loss",
+        "mean squared error of the pairs' critic to its λ-returns",
+    ),
+    (
+        "pair_td_error_abs",
+        "mean |λ-return − value| of the pairs' critic",
+    ),
     ("epsilon", "ε of the bounded softmax in the latest batch"),
     (
         "pg_loss",
-        "−mean of A log π(u) over steps and agents, each with its own advantage",
+        "−sum of A log q(u) over the choices of groups, each with its own advantage, divided by steps and agents",
     ),
     (
         "agent_grad_norm",
         "norm of the policy's gradient before clipping",
     ),
-    ("advantage_mean", "mean of the living agents' advantages"),
+    (
+        "advantage_mean",
+        "mean of the advantages of living agents and of pairs that choose",
+    ),
     (
         "critic_loss",
         "mean squared error of the critic to its λ-returns",
@@ -40,17 +63,19 @@ const METRICS: &[(&str, &str)] = &[
     ),
     ("td_error_abs", "mean |λ-return − value|"),
     ("target_mean", "mean λ-return"),
-    (
-        "mackrl/entropy_agent_controller",
-        "entropy of living agents' controllers, in nats",
-    ),
 ];
 
-/// A team of agents alone whose choices are each weighed by an advantage of their own.
+/// How many of [`METRICS`] are of pairs.
+const OF_PAIRS: usize = 3;
+
+/// What the optimiser's memory of the pairs' critic is called.
+const PAIR_CRITIC: &str = "pair_critic";
+
+/// A team whose groups are each weighed by an advantage of their own: agents alone, or with pairs among them.
 #[derive(Debug)]
-pub struct Agentwise<J> {
+pub struct Groupwise<J> {
     judge: PhantomData<J>,
-    settings: AgentwiseSettings,
+    settings: GroupwiseSettings,
     spec: EnvironmentSpec,
     threads: usize,
     hierarchy: Hierarchy,
@@ -62,65 +87,68 @@ pub struct Agentwise<J> {
     value_rc: Vec<f32>,
     /// Advantages of each row, where they do not depend on the policy \[steps · N\].
     advantage_r: Vec<f32>,
+    pairs: Option<PairValues>,
     shards: Vec<Shard>,
     updates: u64,
 }
 
-/// A piece's share of an update.
-#[derive(Debug, Default)]
-struct Shard {
-    /// Number of its first episode in the batch.
-    first: usize,
-    log_q_i: Vec<f32>,
-    advantage_i: Vec<f32>,
-    workspace: FactorWorkspace,
-    gradient: Vec<f32>,
-    loss: f64,
+/// The critic of a hierarchy's pairs, and the latest batch.
+#[derive(Debug)]
+struct PairValues {
+    critic: ChoiceCritic,
+    rows: ChoiceRows,
+    target_r: Vec<f32>,
+    value_rc: Vec<f32>,
 }
 
-/// What all shards read.
-struct Shared<'a> {
-    hierarchy: &'a Hierarchy,
-    parameters: &'a Parameters,
-    rows: &'a MemberRows,
-    value_rc: &'a [f32],
-    advantage_r: &'a [f32],
-    advantage: Advantage,
-    members: usize,
-    outputs: usize,
-    weight: f32,
-}
-
-impl<J: Judge> Agentwise<J> {
-    /// A team that has learnt nothing, with initial parameters drawn from the team's seed.
+impl<J: Judge> Groupwise<J> {
+    /// A team that acts as `hierarchy` declares and has learnt nothing, with initial parameters drawn from the team's seed.
+    ///
+    /// # Panics
+    /// If the hierarchy does not [factorise](Hierarchy::factorises), or has pairs, and the judge gives no value of each choice.
     #[must_use]
-    pub fn new(settings: AgentwiseSettings, team: Team<'_>) -> Self {
-        let hierarchy = hierarchy(&settings, team);
+    pub fn new(hierarchy: Hierarchy, settings: GroupwiseSettings, team: Team<'_>) -> Self {
+        assert!(hierarchy.factorises(), "one division at a time");
         let parameters = hierarchy.initialise(team.seed);
-        let critic_key = EpisodeKey::new(team.seed, Stream::Other, 1);
-        let critic = critic_settings::<J>(&settings, team.spec);
+        let critic_key = |index| EpisodeKey::new(team.seed, Stream::Other, index);
+        let pairs = has_pairs(&hierarchy).then(|| {
+            let counterfactual = J::ADVANTAGE == Advantage::Counterfactual;
+            assert!(counterfactual, "pairs are judged by their choices");
+            let critic = settings.pair_critic::<J>(team.spec);
+            PairValues {
+                critic: ChoiceCritic::new(critic, &critic_key(2)),
+                rows: ChoiceRows::default(),
+                target_r: Vec::new(),
+                value_rc: Vec::new(),
+            }
+        });
+        let critic = settings.critic::<J>(team.spec);
         Self {
             judge: PhantomData,
             spec: team.spec.clone(),
             threads: team.threads,
             optimiser: Optimiser::new(settings.optimiser(), parameters.len()),
-            critic: MemberCritic::new(critic, &critic_key),
+            critic: MemberCritic::new(critic, &critic_key(1)),
             parameters: Parameters::new(parameters),
             hierarchy,
             settings,
             rows: MemberRows::default(),
             value_rc: Vec::new(),
             advantage_r: Vec::new(),
+            pairs,
             shards: Vec::new(),
             updates: 0,
         }
     }
 
-    /// How many parameters such a team and its critic have.
+    /// How many parameters such a team and its critics have.
     #[must_use]
-    pub fn size(settings: &AgentwiseSettings, team: Team<'_>) -> usize {
-        let critic = MemberCritic::size(&critic_settings::<J>(settings, team.spec));
-        hierarchy(settings, team).layout().len() + critic
+    pub fn size(hierarchy: &Hierarchy, settings: &GroupwiseSettings, team: Team<'_>) -> usize {
+        let MemberCriticSettings { choices, .. } = settings.critic::<J>(team.spec);
+        let pairs = has_pairs(hierarchy).then(|| settings.pair_critic::<J>(team.spec));
+        let critics = [Some(choices), pairs].into_iter().flatten();
+        let critics = critics.map(|critic| ChoiceCritic::size(&critic));
+        hierarchy.layout().len() + critics.sum::<usize>()
     }
 
     /// The policy's gradient of the latest batch, before clipping shortened it; empty before there was one.
@@ -129,43 +157,51 @@ impl<J: Judge> Agentwise<J> {
         self.shards.first().map_or(&[], |shard| &shard.gradient)
     }
 
-    /// Writes what the critic reads: what living agents read, everybody's identity, and what the judge adds.
-    fn read(&mut self, batch: &[&mut Piece], episodes: &[&Episode]) {
-        let EnvironmentSpec {
-            agents,
-            observation_size,
-            ..
-        } = self.spec;
+    /// Finds the groups of a batch and their rows, and lets the critics learn from them.
+    fn judge(
+        &mut self,
+        batch: &[&mut Piece],
+        episodes: &[&Episode],
+        tally: &mut Tally,
+    ) -> Result<CriticReport, NotFinite> {
+        let (spec, bank) = (&self.spec, self.hierarchy.declaration().alone());
         let settings = self.critic.settings();
-        let (inputs, own) = (settings.inputs, settings.inputs - J::inputs(&self.spec));
-        self.rows.begin(episodes, settings);
-        for (b, episode) in episodes.iter().enumerate() {
-            for t in 0..episode.steps() {
-                for member in 0..agents {
-                    let row = self.rows.row([b, t], member, agents);
-                    let input = &mut self.rows.input_rf[row * inputs..(row + 1) * inputs];
-                    input[observation_size + member] = 1.0;
-                    J::write(&self.spec, episode, t, member, &mut input[own..]);
-                    if J::ADVANTAGE == Advantage::Counterfactual {
-                        self.rows.column_r[row] = episode.actions(t)[member].index();
-                    }
-                }
-            }
-        }
-        let bank = self.hierarchy.declaration().alone();
+        read_members::<J>(&mut self.rows, spec, settings, (batch, bank), episodes);
+        self.shards.resize_with(batch.len(), Shard::default);
         let mut first = 0;
-        for piece in batch {
-            let bank = &piece.experience.banks[bank];
-            for (t, step) in bank.steps().iter().enumerate() {
-                let read = bank.inputs_of(step).chunks_exact(own);
-                for (instance, read) in bank.instances_of(step).iter().zip(read) {
-                    let place = [first + instance.environment, t];
-                    let row = self.rows.row(place, instance.group, agents);
-                    self.rows.input_rf[row * inputs..][..own].copy_from_slice(read);
-                }
-            }
+        for (shard, piece) in self.shards.iter_mut().zip(batch) {
+            let own = &mut shard.choices;
+            own.first = first;
+            own.factors = self
+                .hierarchy
+                .factors(&piece.experience, Weighing::Choosing);
+            own.place(&self.rows, spec.agents);
             first += piece.experience.episodes.len();
         }
+        let report = self
+            .critic
+            .learn(episodes, &self.rows, &mut self.value_rc)?;
+        if J::ADVANTAGE == Advantage::Temporal {
+            self.write_temporal_advantages(episodes);
+        }
+        let Some(pairs) = &mut self.pairs else {
+            return Ok(report);
+        };
+        read_pairs::<J>(
+            (&mut pairs.rows, &mut pairs.target_r),
+            (&self.rows, self.critic.target_r()),
+            &self.spec,
+            pairs.critic.settings(),
+            self.shards.iter_mut().map(|shard| &mut shard.choices),
+            episodes,
+        );
+        let own = (pairs.critic).learn(&pairs.rows, &pairs.target_r, &mut pairs.value_rc)?;
+        let choices = self.shards.iter().map(|shard| shard.choices.row_i.len());
+        let of_pairs = pairs.rows.len() as f64;
+        tally.add("choices_of_pairs", of_pairs, choices.sum::<usize>() as f64);
+        tally.add("pair_critic_loss", own.loss * of_pairs, of_pairs);
+        tally.add("pair_td_error_abs", own.td_error_abs * of_pairs, of_pairs);
+        Ok(report)
     }
 
     /// Writes `r + γ V' − V` of every row.
@@ -176,7 +212,7 @@ impl<J: Judge> Agentwise<J> {
         };
         let members = self.spec.agents;
         self.advantage_r.clear();
-        self.advantage_r.resize(self.rows.column_r.len(), 0.0);
+        self.advantage_r.resize(self.rows.rows.len(), 0.0);
         let (mut value_t, mut advantage_t) = (Vec::new(), Vec::new());
         for (b, episode) in episodes.iter().enumerate() {
             for member in 0..members {
@@ -196,24 +232,24 @@ impl<J: Judge> Agentwise<J> {
 
     /// Computes the gradient of the loss into the first shard's, and gives the loss and the mean advantage.
     fn differentiate(&mut self, batch: &mut [&mut Piece], steps: usize) -> Result<[f64; 2], Error> {
-        self.shards.resize_with(batch.len(), Shard::default);
         let length = self.parameters.values().len();
-        let mut first = 0;
-        for (shard, piece) in self.shards.iter_mut().zip(&*batch) {
-            shard.first = first;
-            first += piece.experience.episodes.len();
-        }
-        let members = self.spec.agents;
+        let pairs = self.pairs.as_ref().map(|pairs| Values {
+            value_rc: &pairs.value_rc,
+            outputs: pairs.critic.settings().outputs,
+            column_r: &pairs.rows.column_r,
+        });
         let shared = Shared {
             hierarchy: &self.hierarchy,
             parameters: &self.parameters,
-            rows: &self.rows,
-            value_rc: &self.value_rc,
+            members: Values {
+                value_rc: &self.value_rc,
+                outputs: self.critic.settings().choices.outputs,
+                column_r: &self.rows.rows.column_r,
+            },
+            pairs: pairs.unwrap_or_default(),
             advantage_r: &self.advantage_r,
             advantage: J::ADVANTAGE,
-            members,
-            outputs: self.critic.settings().outputs,
-            weight: Real::from_f64(1.0 / (steps * members) as f64),
+            weight: Real::from_f64(1.0 / (steps * self.spec.agents) as f64),
         };
         let pieces = batch.iter_mut().zip(&mut self.shards);
         let mut work: Vec<_> = pieces
@@ -246,65 +282,7 @@ impl<J: Judge> Agentwise<J> {
     }
 }
 
-impl Shard {
-    /// Writes the piece's gradient and its loss.
-    fn differentiate(&mut self, shared: &Shared<'_>, piece: &mut Piece) -> Result<(), Error> {
-        let &Shared {
-            hierarchy,
-            parameters,
-            rows,
-            members,
-            outputs,
-            weight,
-            ..
-        } = shared;
-        let (experience, activations) = hierarchy.networks(parameters, piece)?;
-        let factors = hierarchy.factors(experience, Weighing::Choosing);
-        hierarchy.log_q(activations, &factors, &mut self.log_q_i);
-        let first = self.first;
-        let row = |factor: &Factor| {
-            rows.row([first + factor.episode, factor.step], factor.first, members)
-        };
-        self.advantage_i.clear();
-        match shared.advantage {
-            Advantage::Temporal => {
-                let advantages = factors.iter().map(|own| shared.advantage_r[row(own)]);
-                self.advantage_i.extend(advantages);
-            }
-            Advantage::Counterfactual => {
-                let values = |factor: &Factor| &shared.value_rc[row(factor) * outputs..][..outputs];
-                let expected = &mut self.advantage_i;
-                hierarchy.expectations(activations, &factors, values, expected);
-                for (expected, factor) in expected.iter_mut().zip(&factors) {
-                    *expected = values(factor)[rows.column_r[row(factor)]] - *expected;
-                }
-            }
-        }
-        if let Some(index) = first_not_finite(&self.advantage_i) {
-            let place = [("choice", index)];
-            return Err(NotFinite::new("advantage", &place, self.advantage_i[index]).into());
-        }
-        let weights = vec![weight; factors.len()];
-        let mut d_log_q = Vec::new();
-        self.loss = policy_gradient(
-            std::slice::from_ref(&self.log_q_i),
-            std::slice::from_ref(&self.advantage_i),
-            &weights,
-            &mut d_log_q,
-        );
-        hierarchy.backward_factors(
-            parameters,
-            experience,
-            activations,
-            (&factors, &d_log_q[0], 0.0),
-            &mut self.workspace,
-            &mut self.gradient,
-        );
-        Ok(())
-    }
-}
-
-impl<J: Judge> Algorithm for Agentwise<J> {
+impl<J: Judge> Algorithm for Groupwise<J> {
     fn policy(&self) -> &dyn Policy {
         &self.hierarchy
     }
@@ -339,19 +317,14 @@ impl<J: Judge> Algorithm for Agentwise<J> {
             .iter()
             .flat_map(|piece| &piece.experience.episodes)
             .collect();
-        self.read(batch, &episodes);
-        let critic = self
-            .critic
-            .learn(&episodes, &self.rows, &mut self.value_rc)?;
-        if J::ADVANTAGE == Advantage::Temporal {
-            self.write_temporal_advantages(&episodes);
-        }
+        let mut tally = Tally::default();
+        let critic = self.judge(batch, &episodes, &mut tally)?;
         stopwatch.lap(Phase::Critic);
         let [loss, advantage] = self.differentiate(batch, steps)?;
         stopwatch.lap(Phase::Backward);
         if !loss.is_finite() {
             let loss = Real::from_f64(loss);
-            return Err(NotFinite::new("sum of A log π(u)", &[], loss).into());
+            return Err(NotFinite::new("sum of A log q(u)", &[], loss).into());
         }
         let rates = [self.settings.learning_rate, self.settings.gradient_norm_max];
         let (optimiser, layout) = (&mut self.optimiser, self.hierarchy.layout());
@@ -360,7 +333,6 @@ impl<J: Judge> Algorithm for Agentwise<J> {
         let norm = self.parameters.change(step)?;
         self.updates += 1;
         stopwatch.lap(Phase::Optimiser);
-        let mut tally = Tally::default();
         for (name, value) in [
             ("epsilon", f64::from(exploration)),
             ("pg_loss", loss),
@@ -381,29 +353,46 @@ impl<J: Judge> Algorithm for Agentwise<J> {
     }
 
     fn metrics(&self) -> &'static [(&'static str, &'static str)] {
-        METRICS
+        let without = if self.pairs.is_some() { 0 } else { OF_PAIRS };
+        &METRICS[without..]
     }
 
     fn models(&self) -> Vec<(&ParameterLayout, &[f32])> {
-        vec![
+        let pairs = self.pairs.as_ref().map(|pairs| &pairs.critic);
+        let mut models = vec![
             (self.hierarchy.layout(), self.parameters.values()),
             (self.critic.layout(), self.critic.parameters()),
-        ]
+        ];
+        models.extend(pairs.map(|critic| (critic.layout(), critic.parameters())));
+        models
     }
 
     fn state(&self) -> AlgorithmState {
         let parameters = self.parameters.values();
-        AlgorithmState::of_actor_critic(
-            self.settings.optimiser(),
+        let kind = self.settings.optimiser();
+        let mut state = AlgorithmState::of_actor_critic(
+            kind,
             [self.hierarchy.layout(), self.critic.layout()],
             (parameters, self.optimiser.moments(), self.updates),
             &self.critic.state(),
-        )
+        );
+        if let Some(PairValues { critic, .. }) = &self.pairs {
+            state.add_tensors(critic.layout(), critic.parameters());
+            state.add_moments(PAIR_CRITIC, kind, critic.layout(), critic.moments());
+        }
+        state
     }
 
     fn restore(&mut self, stored: &dyn StoredState) -> Result<(), Error> {
         let layouts = [self.hierarchy.layout(), self.critic.layout()];
-        let (policy, critic) = read_actor_critic(stored, self.settings.optimiser(), layouts)?;
+        let kind = self.settings.optimiser();
+        let (policy, critic) = read_actor_critic(stored, kind, layouts)?;
+        if let Some(PairValues { critic, .. }) = &mut self.pairs {
+            let parameters = stored.tensors(critic.layout())?;
+            let moments = read_moments(stored, PAIR_CRITIC, kind, critic.layout())?;
+            critic.load(&parameters);
+            critic.restore_moments(moments);
+        }
         self.parameters = Parameters::new(policy.parameters);
         self.optimiser.restore(policy.moments);
         self.critic.restore(critic);
@@ -414,29 +403,16 @@ impl<J: Judge> Algorithm for Agentwise<J> {
     fn load(&mut self, stored: &dyn StoredState) -> Result<(), Error> {
         let parameters = stored.tensors(self.hierarchy.layout())?;
         let critic = stored.tensors(self.critic.layout())?;
+        if let Some(PairValues { critic, .. }) = &mut self.pairs {
+            critic.load(&stored.tensors(critic.layout())?);
+        }
         self.parameters = Parameters::new(parameters);
         self.critic.load(&critic);
         Ok(())
     }
 }
 
-/// The hierarchy without upper levels.
-fn hierarchy(settings: &AgentwiseSettings, team: Team<'_>) -> Hierarchy {
-    let declaration = Declaration::agents_alone([team.spec.agents, team.spec.actions]);
-    let own = HierarchySettings {
-        // No group reads it.
-        common_knowledge: CommonKnowledgeFeatures::default(),
-        hidden: settings.hidden,
-        networks: NetworkStyle::Plain,
-    };
-    Hierarchy::new(declaration, team.spec, team.prior, own)
-}
-
-fn critic_settings<J: Judge>(
-    settings: &AgentwiseSettings,
-    spec: &EnvironmentSpec,
-) -> MemberCriticSettings {
-    let own = spec.observation_size + spec.agents + spec.actions;
-    let outputs = J::ADVANTAGE.outputs(spec.actions);
-    settings.critic([own + J::inputs(spec), outputs], spec.agents)
+/// Whether a hierarchy has pairs that may choose.
+fn has_pairs(hierarchy: &Hierarchy) -> bool {
+    hierarchy.declaration().levels().len() > 2
 }

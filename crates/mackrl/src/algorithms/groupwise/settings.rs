@@ -1,24 +1,25 @@
-//! The settings of IAC and COMA.
+//! The settings of IAC, COMA and MACKRL-COMA.
 
 use mackrl_env::{
-    declare_settings,
+    EnvironmentSpec, declare_settings,
     settings::{Accepts, EXACT, SettingsError},
 };
 
+use super::Judge;
 use crate::{
     algorithms::shared_settings::{Exploration, OptimiserName},
-    critics::MemberCriticSettings,
+    critics::{ChoiceCriticSettings, MemberCriticSettings},
     nn::OptimiserKind,
     objectives::ReturnSettings,
 };
 
 declare_settings! {
     /// Sizes of the networks, how training explores (p = (1 − ε)·softmax + ε·uniform, with ε falling linearly), and how the
-    /// agents and the critic learn.
-    pub struct AgentwiseSettings {
-        /// Units in each hidden layer and each recurrent state of the agents.
+    /// controllers and the critics learn.
+    pub struct GroupwiseSettings {
+        /// Units in each hidden layer and each recurrent state.
         hidden: usize = 64, Accepts::integer(1, 4096);
-        /// Units in each of the critic's two hidden layers.
+        /// Units in each of a critic's two hidden layers.
         critic_hidden: usize = 128, Accepts::integer(1, 4096);
         /// ε, a probability, at the first environment step.
         exploration_start: f64 = 0.5, Accepts::within(0.0, 1.0);
@@ -26,13 +27,13 @@ declare_settings! {
         exploration_finish: f64 = 0.01, Accepts::within(0.0, 1.0);
         /// Environment steps, summed over the parallel environments, over which ε falls.
         exploration_steps_env: u64 = 100_000, Accepts::integer(1, EXACT);
-        /// How parameters follow the gradient, for the agents and for the critic.
+        /// How parameters follow the gradient, for the controllers and for the critic.
         optimiser: OptimiserName = OptimiserName::Rmsprop, OptimiserName::ACCEPTS;
         /// What is added to the root of the mean squared gradient before a step is divided by it.
         optimiser_epsilon: f64 = 1e-5, Accepts::above_within(0.0, 1.0);
         /// Of `rmsprop`: how much of the mean squared gradient is kept at a step. The larger, the longer its memory.
         rmsprop_smoothing: f64 = 0.99, Accepts::within(0.0, 0.999_999);
-        /// Step size of the agents.
+        /// Step size of the controllers.
         learning_rate: f64 = 5e-4, Accepts::above_within(0.0, 1.0);
         /// Step size of the critic.
         critic_learning_rate: f64 = 5e-4, Accepts::above_within(0.0, 1.0);
@@ -52,7 +53,7 @@ declare_settings! {
     }
 }
 
-impl AgentwiseSettings {
+impl GroupwiseSettings {
     /// How parameters follow the gradient.
     #[must_use]
     pub const fn optimiser(&self) -> OptimiserKind {
@@ -68,25 +69,40 @@ impl AgentwiseSettings {
         }
     }
 
-    /// The critic of `members` members that reads rows of `inputs` numbers and gives rows of `outputs`.
-    pub(super) fn critic(
-        &self,
-        [inputs, outputs]: [usize; 2],
-        members: usize,
-    ) -> MemberCriticSettings {
+    /// The critic of a team's members: of each, what it reads itself and what the judge adds.
+    pub(super) fn critic<J: Judge>(&self, spec: &EnvironmentSpec) -> MemberCriticSettings {
         MemberCriticSettings {
-            inputs,
-            hidden: self.critic_hidden,
-            outputs,
-            members,
-            optimiser: self.optimiser(),
-            learning_rate: self.critic_learning_rate,
-            gradient_norm_max: self.gradient_norm_max,
+            choices: self.choices::<J>("critic", 1, spec),
+            members: spec.agents,
             returns: ReturnSettings {
                 gamma: self.gamma,
                 lambda: self.lambda,
             },
             target_interval_updates: self.target_interval_updates,
+        }
+    }
+
+    /// The critic of pairs: of each, what both members read and what the judge adds.
+    pub(super) fn pair_critic<J: Judge>(&self, spec: &EnvironmentSpec) -> ChoiceCriticSettings {
+        self.choices::<J>("pair_critic", 2, spec)
+    }
+
+    fn choices<J: Judge>(
+        &self,
+        name: &'static str,
+        size: usize,
+        spec: &EnvironmentSpec,
+    ) -> ChoiceCriticSettings {
+        let own = spec.observation_size + spec.agents + spec.actions;
+        let choices = (0..size).fold(1, |product, _| product * spec.actions);
+        ChoiceCriticSettings {
+            name,
+            inputs: size * own + J::inputs(spec),
+            hidden: self.critic_hidden,
+            outputs: J::ADVANTAGE.outputs(choices),
+            optimiser: self.optimiser(),
+            learning_rate: self.critic_learning_rate,
+            gradient_norm_max: self.gradient_norm_max,
         }
     }
 
