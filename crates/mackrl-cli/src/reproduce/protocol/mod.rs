@@ -139,11 +139,13 @@ fn plans(folder: &Path, runs: Option<&Path>) -> anyhow::Result<Vec<Plan>> {
         }
     }
     paths.sort();
-    anyhow::ensure!(
-        !paths.is_empty(),
-        "there is no plan-*.toml in {}",
-        folder.display()
-    );
+    if paths.is_empty() {
+        return Err(Failure::usage(format!(
+            "there is no plan-*.toml in {}, expected the folder of a protocol, such as results/protocol",
+            folder.display()
+        ))
+        .into());
+    }
     let plan = |path: &PathBuf| {
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let own = stem.strip_prefix("plan-").unwrap_or(&stem);
