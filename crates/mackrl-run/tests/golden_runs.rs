@@ -11,13 +11,16 @@ use mackrl_skirmish::SIMULATOR_VERSION;
 use serde_json::{Value, json};
 
 /// Preset, map and algorithm.
-const RUNS: [[&str; 3]; 6] = [
+const RUNS: [[&str; 3]; 9] = [
     ["paper-code", "3m", "mackrl"],
     ["paper-code", "3m", "central-v"],
     ["paper-code", "2s3z", "mackrl"],
     ["paper-code", "2s3z", "central-v"],
     ["default", "3m", "mackrl-ppo"],
     ["default", "2s3z", "mappo"],
+    ["pymarl-qmix", "3m", "qmix"],
+    ["pymarl-coma", "3m", "coma"],
+    ["default", "3m", "mackrl-coma"],
 ];
 
 fn config([preset, map, algorithm]: [&str; 3]) -> Config {
