@@ -46,9 +46,11 @@ pub use vdn::{Summed, Vdn};
 
 use crate::{
     Error, Stopwatch,
+    common_knowledge::CommonKnowledgeFeatures,
     experience::Piece,
+    hierarchy::{Hierarchy, HierarchySettings, NetworkStyle},
     nn::ParameterLayout,
-    policy::{Behaviour, Parameters, Policy, Tally},
+    policy::{Behaviour, Declaration, Parameters, Policy, Tally},
 };
 
 /// What learns: a policy, its parameters, and how both change.
@@ -125,6 +127,37 @@ pub struct Team<'a> {
     pub seed: u64,
     /// Threads that may be used, which changes no result.
     pub threads: usize,
+}
+
+impl Team<'_> {
+    /// A declared hierarchy of plain networks with so many units in each layer.
+    fn hierarchy(
+        self,
+        declaration: Declaration,
+        common_knowledge: CommonKnowledgeFeatures,
+        hidden: usize,
+    ) -> Hierarchy {
+        let settings = HierarchySettings {
+            common_knowledge,
+            hidden,
+            networks: NetworkStyle::Plain,
+        };
+        Hierarchy::new(declaration, self.spec, self.prior, settings)
+    }
+}
+
+/// Steps of a batch, at least one.
+fn steps_to_learn_from(batch: &[&mut Piece]) -> Result<usize, Error> {
+    match batch.iter().map(|piece| piece.experience.steps()).sum() {
+        0 => Err(Error::Data("there is no step to learn from".to_owned())),
+        steps => Ok(steps),
+    }
+}
+
+/// Adds a shard's gradient to the sum of those before it.
+fn add_to(sums: &mut [f32], terms: &[f32]) {
+    let both = sums.iter_mut().zip(terms);
+    both.for_each(|(sum, term)| *sum += term);
 }
 
 /// An algorithm that configurations can name, with the settings that it declares.

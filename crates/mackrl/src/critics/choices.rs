@@ -203,9 +203,8 @@ impl ChoiceCritic {
             report.td_error_abs += one.td_error_abs / times as f64;
             report.target_mean += one.target_mean / times as f64;
         }
-        let values = value_rc.chunks_exact(outputs).zip(&rows.column_r);
-        let chosen = values.map(|(value_c, &column)| &value_c[column]);
-        report.explained_variance = explained(target_r.iter().zip(chosen));
+        let chosen_r = chosen(value_rc, outputs, &rows.column_r);
+        report.explained_variance = explained(target_r.iter().zip(chosen_r));
         Ok(report)
     }
 
@@ -228,8 +227,7 @@ impl ChoiceCritic {
         self.network.forward(&self.weights, &mut self.trace);
         let (given, gradients) = self.trace.outputs_and_gradient_mut();
         values.copy_from_slice(given);
-        let chosen = given.chunks_exact(outputs).zip(columns);
-        let chosen: Vec<f32> = chosen.map(|(value_c, &column)| value_c[column]).collect();
+        let chosen: Vec<f32> = chosen(given, outputs, columns).copied().collect();
         let mut slopes = vec![0.0; chosen.len()];
         let weight = Real::from_f64(1.0 / count);
         let errors = squared_errors(weight, [&chosen, targets], &mut slopes);
@@ -266,6 +264,16 @@ impl ChoiceCritic {
             explained_variance: 0.0,
         })
     }
+}
+
+/// Of values \[R, C\], those in the columns of what was done \[R\].
+pub(super) fn chosen<'a>(
+    value_rc: &'a [f32],
+    outputs: usize,
+    column_r: &'a [usize],
+) -> impl Iterator<Item = &'a f32> {
+    let rows = value_rc.chunks_exact(outputs).zip(column_r);
+    rows.map(|(value_c, &column)| &value_c[column])
 }
 
 #[cfg(test)]

@@ -5,7 +5,9 @@
 
 use mackrl_env::EpisodeKey;
 
-use super::{ChoiceCritic, ChoiceCriticSettings, ChoiceRows, CriticReport, CriticState};
+use super::{
+    ChoiceCritic, ChoiceCriticSettings, ChoiceRows, CriticReport, CriticState, choices::chosen,
+};
 use crate::{
     NotFinite,
     experience::Episode,
@@ -189,19 +191,14 @@ impl MemberCritic {
             ..
         } = self.settings;
         let critic = &mut self.critic;
-        let mut chosen_r = Vec::with_capacity(rows.rows.len());
+        let mut chosen_r: Vec<f32> = Vec::with_capacity(rows.rows.len());
         let blocks = rows.rows.input_rf.chunks(BLOCK_ROWS * choices.inputs);
         for (block, columns) in blocks.zip(rows.rows.column_r.chunks(BLOCK_ROWS)) {
             critic.trace.begin(columns.len()).copy_from_slice(block);
             critic
                 .network
                 .forward(&self.target_weights, &mut critic.trace);
-            let values = critic.trace.outputs().chunks_exact(choices.outputs);
-            chosen_r.extend(
-                values
-                    .zip(columns)
-                    .map(|(value_c, &column)| value_c[column]),
-            );
+            chosen_r.extend(chosen(critic.trace.outputs(), choices.outputs, columns));
         }
         self.target_r.clear();
         self.target_r.resize(chosen_r.len(), 0.0);

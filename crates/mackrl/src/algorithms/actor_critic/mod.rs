@@ -12,7 +12,10 @@ use mackrl_env::{EpisodeKey, Stream};
 
 pub use settings::ActorCriticSettings;
 
-use super::{Algorithm, AlgorithmState, StoredState, Team, state::read_actor_critic};
+use super::{
+    Algorithm, AlgorithmState, StoredState, Team, add_to, state::read_actor_critic,
+    steps_to_learn_from,
+};
 use crate::{
     Error, NotFinite, Phase, Real, Stopwatch,
     critics::{CentralCritic, CriticReport},
@@ -164,8 +167,7 @@ impl ActorCritic {
         }
         if let Some((first, others)) = self.gradients.split_first_mut() {
             for other in others {
-                let terms = first.iter_mut().zip(&*other);
-                terms.for_each(|(sum, term)| *sum += term);
+                add_to(first, other);
             }
         }
         Ok((loss, health))
@@ -234,14 +236,11 @@ impl Algorithm for ActorCritic {
         batch: &mut [&mut Piece],
         stopwatch: &mut Stopwatch,
     ) -> Result<Tally, Error> {
+        let steps = steps_to_learn_from(batch)?;
         let episodes: Vec<&Episode> = batch
             .iter()
             .flat_map(|piece| &piece.experience.episodes)
             .collect();
-        let steps: usize = episodes.iter().map(|episode| episode.steps()).sum();
-        if steps == 0 {
-            return Err(Error::Data("there is no step to learn from".to_owned()));
-        }
         let critic = self.critic.learn(&episodes, &mut self.advantage_bt)?;
         check_advantages(&self.advantage_bt)?;
         stopwatch.lap(Phase::Critic);

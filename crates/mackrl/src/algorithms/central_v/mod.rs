@@ -9,7 +9,7 @@ use crate::{
     Error,
     algorithms::{ActorCritic, ActorCriticSettings, Algorithm, AlgorithmKind, Team},
     common_knowledge::CommonKnowledgeFeatures,
-    hierarchy::{Hierarchy, HierarchySettings, NetworkStyle},
+    hierarchy::Hierarchy,
     policy::Declaration,
 };
 
@@ -58,12 +58,8 @@ impl AlgorithmKind for CentralV {
 fn parts(table: &toml::Table, team: Team<'_>) -> Result<(Hierarchy, ActorCriticSettings), Error> {
     let settings = ActorCriticSettings::read(table).map_err(Error::setting)?;
     let declaration = Declaration::agents_alone([team.spec.agents, team.spec.actions]);
-    let own = HierarchySettings {
-        // No group reads it.
-        common_knowledge: CommonKnowledgeFeatures::default(),
-        hidden: settings.hidden,
-        networks: NetworkStyle::Plain,
-    };
-    let hierarchy = Hierarchy::new(declaration, team.spec, team.prior, own);
+    // No group reads common knowledge.
+    let features = CommonKnowledgeFeatures::default();
+    let hierarchy = team.hierarchy(declaration, features, settings.hidden);
     Ok((hierarchy, settings))
 }

@@ -12,8 +12,9 @@ use super::{
 use crate::{
     Error, NotFinite, Phase, Real, Stopwatch,
     algorithms::{
-        Algorithm, AlgorithmState, StoredState, Team,
+        Algorithm, AlgorithmState, StoredState, Team, add_to,
         state::{read_actor_critic, read_moments},
+        steps_to_learn_from,
     },
     critics::{
         ChoiceCritic, ChoiceRows, CriticReport, MemberCritic, MemberCriticSettings, MemberRows,
@@ -274,8 +275,7 @@ impl<J: Judge> Groupwise<J> {
         let loss = self.shards.iter().map(|shard| shard.loss).sum();
         if let Some((first, others)) = self.shards.split_first_mut() {
             for other in others {
-                let terms = first.gradient.iter_mut().zip(&other.gradient);
-                terms.for_each(|(sum, term)| *sum += term);
+                add_to(&mut first.gradient, &other.gradient);
             }
         }
         Ok([loss, mean])
@@ -308,10 +308,7 @@ impl<J: Judge> Algorithm for Groupwise<J> {
         batch: &mut [&mut Piece],
         stopwatch: &mut Stopwatch,
     ) -> Result<Tally, Error> {
-        let steps: usize = batch.iter().map(|piece| piece.experience.steps()).sum();
-        if steps == 0 {
-            return Err(Error::Data("there is no step to learn from".to_owned()));
-        }
+        let steps = steps_to_learn_from(batch)?;
         let exploration = batch[0].experience.exploration;
         let episodes: Vec<&Episode> = batch
             .iter()

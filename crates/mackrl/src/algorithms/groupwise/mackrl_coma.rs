@@ -5,7 +5,7 @@ use mackrl_env::{
     settings::{Accepts, EXACT, Setting, SettingsError},
 };
 
-use super::{Counterfactual, Groupwise, GroupwiseSettings, hierarchy};
+use super::{Counterfactual, Groupwise, GroupwiseSettings};
 use crate::{
     Error,
     algorithms::{
@@ -106,6 +106,6 @@ fn parts(table: &toml::Table, team: Team<'_>) -> Result<(Hierarchy, GroupwiseSet
     )?
     .with_partitions_held(hold, settings.pair_memory.into())
     .with_delegation_logit(settings.delegation_logit);
-    let features = settings.common_knowledge;
-    Ok((hierarchy(declaration, features, &learning, team), learning))
+    let hierarchy = team.hierarchy(declaration, settings.common_knowledge, learning.hidden);
+    Ok((hierarchy, learning))
 }

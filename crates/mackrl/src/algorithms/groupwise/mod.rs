@@ -39,7 +39,7 @@ use crate::{
     algorithms::{Algorithm, AlgorithmKind, Preset, Team},
     common_knowledge::CommonKnowledgeFeatures,
     experience::Episode,
-    hierarchy::{Hierarchy, HierarchySettings, NetworkStyle},
+    hierarchy::Hierarchy,
     policy::Declaration,
 };
 
@@ -195,20 +195,6 @@ fn alone(table: &toml::Table, team: Team<'_>) -> Result<(Hierarchy, GroupwiseSet
     let declaration = Declaration::agents_alone([team.spec.agents, team.spec.actions]);
     // No group reads common knowledge.
     let features = CommonKnowledgeFeatures::default();
-    Ok((hierarchy(declaration, features, &settings, team), settings))
-}
-
-/// A declared hierarchy with its networks.
-fn hierarchy(
-    declaration: Declaration,
-    common_knowledge: CommonKnowledgeFeatures,
-    settings: &GroupwiseSettings,
-    team: Team<'_>,
-) -> Hierarchy {
-    let own = HierarchySettings {
-        common_knowledge,
-        hidden: settings.hidden,
-        networks: NetworkStyle::Plain,
-    };
-    Hierarchy::new(declaration, team.spec, team.prior, own)
+    let hierarchy = team.hierarchy(declaration, features, settings.hidden);
+    Ok((hierarchy, settings))
 }

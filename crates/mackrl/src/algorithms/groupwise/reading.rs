@@ -134,7 +134,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        algorithms::groupwise::{Counterfactual, GroupwiseSettings, hierarchy},
+        algorithms::groupwise::{Counterfactual, GroupwiseSettings},
         common_knowledge::CommonKnowledgeFeatures,
         experience::{Collector, PlaySettings},
         hierarchy::Weighing,
@@ -167,7 +167,7 @@ mod tests {
         );
         let settings = GroupwiseSettings::default();
         let features = CommonKnowledgeFeatures::Complete;
-        let hierarchy = hierarchy(declaration.unwrap(), features, &settings, team);
+        let hierarchy = team.hierarchy(declaration.unwrap(), features, settings.hidden);
         let parameters = Parameters::new(hierarchy.initialise(1));
         let environments = (0..9).map(|_| world.make()).collect();
         let mut collector = Collector::new(&hierarchy, environments, 1, 1);

@@ -22,7 +22,7 @@ use crate::{
         shared_settings::{defaults_of_both, read_both},
     },
     common_knowledge::CommonKnowledgeFeatures,
-    hierarchy::{Hierarchy, HierarchySettings, NetworkStyle},
+    hierarchy::Hierarchy,
     policy::Declaration,
 };
 
@@ -107,11 +107,6 @@ impl AlgorithmKind for Jal {
 fn parts(table: &toml::Table, team: Team<'_>) -> Result<(Hierarchy, ActorCriticSettings), Error> {
     let (settings, learning) = Jal::read(table).map_err(Error::setting)?;
     let declaration = Declaration::whole_team([team.spec.agents, team.spec.actions])?;
-    let own = HierarchySettings {
-        common_knowledge: settings.common_knowledge,
-        hidden: learning.hidden,
-        networks: NetworkStyle::Plain,
-    };
-    let hierarchy = Hierarchy::new(declaration, team.spec, team.prior, own);
+    let hierarchy = team.hierarchy(declaration, settings.common_knowledge, learning.hidden);
     Ok((hierarchy, learning))
 }

@@ -13,7 +13,7 @@ use crate::{
         ActorCritic, ActorCriticSettings, Algorithm, AlgorithmKind, Automatic, Preset, Team,
         shared_settings::{defaults_of_both, read_both},
     },
-    hierarchy::{Hierarchy, HierarchySettings, NetworkStyle},
+    hierarchy::Hierarchy,
     partition::PartitionSchedule,
 };
 
@@ -122,11 +122,6 @@ impl AlgorithmKind for Mackrl {
 fn parts(table: &toml::Table, team: Team<'_>) -> Result<(Hierarchy, ActorCriticSettings), Error> {
     let (settings, learning) = Mackrl::read(table).map_err(Error::setting)?;
     let declaration = settings.declaration([team.spec.agents, team.spec.actions], team.seed)?;
-    let own = HierarchySettings {
-        common_knowledge: settings.common_knowledge,
-        hidden: learning.hidden,
-        networks: NetworkStyle::Plain,
-    };
-    let hierarchy = Hierarchy::new(declaration, team.spec, team.prior, own);
+    let hierarchy = team.hierarchy(declaration, settings.common_knowledge, learning.hidden);
     Ok((hierarchy, learning))
 }

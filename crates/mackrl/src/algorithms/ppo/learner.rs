@@ -15,7 +15,10 @@ use super::{
 };
 use crate::{
     Error, NotFinite, Phase, Real, Stopwatch,
-    algorithms::{Algorithm, AlgorithmState, StoredState, Team, state::read_moments},
+    algorithms::{
+        Algorithm, AlgorithmState, StoredState, Team, add_to, state::read_moments,
+        steps_to_learn_from,
+    },
     critics::{ReturnScale, TeamCritic, TeamCriticSettings},
     experience::Piece,
     hierarchy::{Hierarchy, Weighing},
@@ -232,10 +235,7 @@ impl Algorithm for Ppo {
         batch: &mut [&mut Piece],
         stopwatch: &mut Stopwatch,
     ) -> Result<Tally, Error> {
-        let steps: usize = batch.iter().map(|piece| piece.experience.steps()).sum();
-        if steps == 0 {
-            return Err(Error::Data("there is no step to learn from".to_owned()));
-        }
+        let steps = steps_to_learn_from(batch)?;
         let sums = self.prepare(batch)?;
         self.critic.note_returns(sums.returns);
         self.finish_preparation(batch, &sums);
@@ -366,12 +366,6 @@ fn minibatch_weights(memories: &[Memory]) -> [f32; 2] {
     let choices = alive.filter(|alive| **alive).count();
     let values: usize = memories.iter().map(|memory| memory.value_sn.len()).sum();
     [choices, values].map(|count| Real::from_f64(1.0 / count as f64))
-}
-
-fn add_to(sums: &mut [f32], terms: &[f32]) {
-    sums.iter_mut()
-        .zip(terms)
-        .for_each(|(sum, term)| *sum += term);
 }
 
 /// How the averages of returns are called in checkpoints.

@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     Error, NotFinite, Phase, Real, Stopwatch,
-    algorithms::{Algorithm, AlgorithmState, StoredState, Team, state::read_moments},
+    algorithms::{Algorithm, AlgorithmState, StoredState, Team, add_to, state::read_moments},
     critics::Mixer,
     experience::{EpisodeShape, Piece, RememberedEpisode, ReplayMemory},
     nn::{Optimiser, ParameterLayout, finite_step},
@@ -220,8 +220,7 @@ impl<M: Mixer> QLearner<M> {
             return Err(Error::Data("there is no episode to learn from".to_owned()));
         };
         for other in others {
-            let terms = first.gradient.iter_mut().zip(&other.gradient);
-            terms.for_each(|(sum, term)| *sum += term);
+            add_to(&mut first.gradient, &other.gradient);
         }
         stopwatch.lap(Phase::Backward);
         if !sums.errors.loss.is_finite() {
