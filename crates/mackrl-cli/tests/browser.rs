@@ -91,11 +91,11 @@ fn browse(folder: &Path, address: &str, width: u32) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
-/// A folder with the page and the playback of an untrained team's battle: that of the paper, whose pairs are selected.
-fn team(folder: &Path, map: &str) -> Playback {
+/// A folder with the page and the playback of an untrained team's battle, whose settings are options of `train`.
+fn team(folder: &Path, settings: &str) -> Playback {
     mackrl(
         folder,
-        &format!("train --map {map} --preset paper --steps 100 --out run --set test.episodes=1"),
+        &format!("train {settings} --steps 100 --out run --set test.episodes=1"),
     );
     mackrl(
         folder,
@@ -131,7 +131,7 @@ fn as_shown(knowledge: &GroupKnowledge) -> [String; 3] {
 #[ignore = "needs chromium; run by `.ci/run browser`"]
 fn the_page_shows_the_sets_that_the_library_computes_at_every_step() {
     let folder = tempfile::tempdir().expect("a folder for the story");
-    let playback = team(folder.path(), "2s3z");
+    let playback = team(folder.path(), "--map 2s3z --preset paper");
     let script = r##"
       const choose = (group) => { press("Escape"); for (const agent of group) click(`#agents [data-agent="${agent}"]`); };
       for (let step = 0; step <= Number(document.getElementById("scrub").max); step++) {
@@ -175,7 +175,7 @@ fn the_page_shows_the_sets_that_the_library_computes_at_every_step() {
 #[ignore = "needs chromium; run by `.ci/run browser`"]
 fn a_person_can_play_scrub_choose_and_read_why() {
     let folder = tempfile::tempdir().expect("a folder for the story");
-    let playback = team(folder.path(), "3m");
+    let playback = team(folder.path(), "--map 3m --preset paper");
     let script = r##"
       report("start", clock());
       press("ArrowRight"); press("ArrowRight"); report("keys", clock());
@@ -259,6 +259,35 @@ fn a_person_can_play_scrub_choose_and_read_why() {
 
 #[test]
 #[ignore = "needs chromium; run by `.ci/run browser`"]
+fn larger_groups_than_pairs_are_shown_with_what_they_chose() {
+    for (settings, caption, options) in [
+        (
+            "--map 3m --algorithm jal --set env.sight_range=64",
+            "Team A, B and C",
+            1..100,
+        ),
+        ("--map 2s3z --preset fours", "Group ", 3..4),
+    ] {
+        let folder = tempfile::tempdir().expect("a folder for the story");
+        team(folder.path(), settings);
+        let script = r##"
+          scrubTo(0);
+          for (const table of document.querySelectorAll("#decision table"))
+            report(table.caption.textContent, table.rows.length, table.querySelectorAll("tr.taken").length);
+          finish();
+        "##;
+        let lines = drive(folder.path(), "page.html", script, 1280);
+        let own = lines.iter().find(|line| line.starts_with(caption));
+        let own = own.unwrap_or_else(|| panic!("{settings}: {lines:?}"));
+        let fields: Vec<&str> = own.split('|').collect();
+        let rows: usize = fields[1].parse().expect("a number of rows");
+        assert!(options.contains(&rows), "{own}");
+        assert_eq!(fields[2], "1", "{own}");
+    }
+}
+
+#[test]
+#[ignore = "needs chromium; run by `.ci/run browser`"]
 fn what_a_stranger_wrote_is_shown_and_not_run() {
     let folder = tempfile::tempdir().expect("a folder for the story");
     let folder = folder.path();
@@ -308,7 +337,7 @@ impl Drop for Server {
 #[ignore = "needs chromium; run by `.ci/run browser`"]
 fn served_runs_are_drawn_with_their_replays() {
     let folder = tempfile::tempdir().expect("a folder for the story");
-    team(folder.path(), "3m");
+    team(folder.path(), "--map 3m --preset paper");
     let server = Command::new(cargo_bin("mackrl"))
         .args(["serve", "run", "--port", "0"])
         .current_dir(folder.path())

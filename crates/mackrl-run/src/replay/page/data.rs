@@ -1,6 +1,6 @@
 //! What a page knows of a replay: numbers short enough for a long battle of many units.
 
-use mackrl::policy::{GroupChoice, Mode, PairThought};
+use mackrl::policy::{GroupChoice, GroupThought, Mode, PairThought, PartitionThought, Thought};
 use mackrl_env::{Action, AgentId, EntityId, Environment};
 use mackrl_skirmish::terrain::MAP_SIZE;
 use serde::Serialize;
@@ -71,6 +71,7 @@ struct Decision {
     value: Option<f64>,
     partitions: Vec<Partition>,
     chosen: Option<usize>,
+    groups: Vec<Group>,
     pairs: Vec<Pair>,
     solo: Vec<Solo>,
     /// Probability of the way that was taken.
@@ -85,6 +86,15 @@ struct Partition {
     groups: Vec<Vec<AgentId>>,
     probability: f64,
     posterior: f64,
+}
+
+/// A group that divides further, or the whole team, where it acts as one.
+#[derive(Debug, Serialize)]
+struct Group {
+    members: Vec<AgentId>,
+    divisions: Vec<Partition>,
+    chosen: Option<usize>,
+    joint: Vec<(Vec<Action>, f64)>,
 }
 
 #[derive(Debug, Serialize)]
@@ -231,14 +241,11 @@ impl Decision {
         Self {
             actions: step.actions.clone(),
             value: step.value.map(|value| rounded(value, 3)),
-            partitions: (thought.partitions.iter())
-                .map(|partition| Partition {
-                    groups: living_groups(&thought, partition),
-                    probability: rounded(partition.probability, 4),
-                    posterior: rounded(partition.posterior, 4),
-                })
-                .collect(),
+            partitions: Partition::all(&thought, &thought.partitions),
             chosen: thought.chosen,
+            groups: (thought.groups.iter())
+                .map(|group| Group::of(&thought, group))
+                .collect(),
             pairs: thought.pairs.iter().map(Pair::of).collect(),
             solo: (thought.agents.iter())
                 .map(|agent| Solo {
@@ -250,6 +257,30 @@ impl Decision {
                 .collect(),
             way: is_known.then(|| thought.log_p_path.exp()),
             marginal: is_known.then(|| thought.log_p.exp()),
+        }
+    }
+}
+
+impl Partition {
+    fn all(thought: &Thought, partitions: &[PartitionThought]) -> Vec<Self> {
+        let partitions = partitions.iter().map(|partition| Self {
+            groups: living_groups(thought, partition),
+            probability: rounded(partition.probability, 4),
+            posterior: rounded(partition.posterior, 4),
+        });
+        partitions.collect()
+    }
+}
+
+impl Group {
+    fn of(thought: &Thought, group: &GroupThought) -> Self {
+        Self {
+            members: group.members.clone(),
+            divisions: Partition::all(thought, &group.divisions),
+            chosen: group.chosen,
+            joint: (group.joint.iter())
+                .map(|option| (option.actions.clone(), rounded(option.probability, 4)))
+                .collect(),
         }
     }
 }

@@ -96,6 +96,7 @@ function showDecision() {
   }
   box.append(make("h2", { text: `Decision at step ${current.step}` }));
   if (decision.partitions.length > 0) showPartition(box, decision);
+  for (const group of decision.groups) showGroup(box, group, decision);
   showTables(box, decision);
   if (decision.marginal !== null) box.append(make("p", { className: "facts",
     text: `Probability of the way taken ${small(decision.way)}; of the joint action over all ways, p(u) = ${small(decision.marginal)}.` }));
@@ -115,11 +116,22 @@ function showPartition(box, decision) {
     fill();
     box.append(details);
   }
-  if (decision.partitions.length > 1) {
-    const rows = decision.partitions.map((partition, index) => ({ name: groupsName(partition.groups), probability: partition.probability, taken: index === decision.chosen }));
-    rows.sort((a, b) => b.probability - a.probability);
-    box.append(table("Partitions", rows.slice(0, 5)));
-  }
+  if (decision.partitions.length > 1) box.append(divisionTable("Partitions", decision.partitions, decision.chosen));
+}
+
+/** A group that divides further, if it was formed; or the whole team, where it acts as one. */
+function showGroup(box, group, decision) {
+  if (group.joint.length > 0)
+    box.append(table(`Team ${listed(group.members)}`, group.joint.map(([actions, probability]) => ({
+      name: actions.map((action, place) => actionName(group.members[place], action)).join(" + "), probability,
+      taken: actions.every((action, place) => decision.actions[group.members[place]] === action) }))));
+  else if (group.chosen !== null) box.append(divisionTable(`Group ${listed(group.members)}`, group.divisions, group.chosen));
+}
+
+function divisionTable(caption, divisions, chosen) {
+  const rows = divisions.map((division, index) => ({ name: groupsName(division.groups), probability: division.probability, taken: index === chosen }));
+  rows.sort((a, b) => b.probability - a.probability);
+  return table(caption, rows.slice(0, 5));
 }
 
 const groupsName = (groups) => groups.map((group) => `{${group.map(nameOf).join(", ")}}`).join(" ");
