@@ -17,13 +17,9 @@ use mackrl_env::{
     Action, AgentId, Draw, EpisodeKey, Stream,
     matrix_game::{ACTIONS, ObservationDistribution, Payoffs, payoff},
 };
-use mackrl_run::{
-    config::{ConfigBuilder, registry},
-    training::{Trainer, evaluate},
-};
 use support::{
     Tables, assert_close,
-    learner::{Run, Stored, tensors},
+    learner::{Run, assert_repeats, tensors},
     team::{Team, keys, world},
 };
 
@@ -386,24 +382,7 @@ fn a_run_has_the_same_bits_on_any_number_of_threads_and_after_a_restoration() {
         (&MackrlComa, "hold_steps_env = 0\npair_memory = \"episode\""),
     ];
     for (kind, settings) in kinds {
-        let mut whole = Run::new(&world, kind, [SMALL, settings], 1);
-        let mut threads = Run::new(&world, kind, [SMALL, settings], 3);
-        let initial = Stored(whole.algorithm.state());
-        for _ in 0..2 {
-            assert_eq!(whole.update(), threads.update());
-        }
-        let stored = Stored(whole.algorithm.state());
-        for (layout, before) in &initial.0.tensors {
-            let learns = tensors(&stored.0, &layout.tensors()[0].name);
-            let is_target = layout.tensors()[0].name.starts_with("target.");
-            assert!(is_target || before[..learns.len()] != learns, "{settings}");
-        }
-        assert_eq!(threads.algorithm.state(), stored.0, "{}", kind.name());
-        let mut resumed = Run::new(&world, kind, [SMALL, settings], 2);
-        resumed.algorithm.restore(&stored).unwrap();
-        resumed.episodes = whole.episodes;
-        assert_eq!(whole.update(), resumed.update());
-        assert_eq!(whole.algorithm.state(), resumed.algorithm.state());
+        assert_repeats(&world, kind, [SMALL, settings]);
     }
 }
 
@@ -416,42 +395,5 @@ fn agents_on_their_own_play_what_the_team_plays_and_all_that_is_reported_is_expl
             run.assert_explained();
             run.assert_decentralised(&world, 0.3);
         }
-    }
-}
-
-#[test]
-fn groups_learn_what_sanity_worlds_ask_of_them() {
-    for (world, algorithm) in [
-        ("sanity-observe", "iac"),
-        ("sanity-observe", "coma"),
-        ("sanity-remember", "coma"),
-        ("sanity-observe", "mackrl-coma"),
-        ("sanity-coordinate", "mackrl-coma"),
-    ] {
-        let settings = [
-            format!("env.name={world}"),
-            format!("algorithm.name={algorithm}"),
-            "algorithm.environments=32".to_owned(),
-            "algorithm.optimiser=adam".to_owned(),
-            "algorithm.learning_rate=0.002".to_owned(),
-            "algorithm.critic_learning_rate=0.005".to_owned(),
-            "algorithm.exploration_steps_env=10000".to_owned(),
-            "run.steps_env=25000".to_owned(),
-            "test.interval_steps_env=25000".to_owned(),
-        ];
-        let config = settings
-            .iter()
-            .fold(ConfigBuilder::new(registry()), |builder, setting| {
-                builder.set(setting).expect("a known setting")
-            })
-            .build()
-            .expect("settings within their ranges");
-        let mut trainer = Trainer::new(&config, 2).expect("a run that can begin");
-        while !trainer.finished() {
-            trainer.update().expect("finite gradients");
-        }
-        let found = evaluate(&config, &trainer.weights(), 400, 1, 2).expect("its own weights");
-        let success = found.mean("success").expect("a statistic of all three");
-        assert!(success >= 0.95, "{algorithm}, {world}: {success}");
     }
 }

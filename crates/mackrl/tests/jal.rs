@@ -16,7 +16,7 @@ use mackrl_run::{
     training::{Trainer, evaluate},
 };
 use support::{
-    learner::{Run, Stored},
+    learner::{Run, assert_repeats},
     team::{Team, keys, norm, world},
 };
 
@@ -83,19 +83,7 @@ fn agents_on_their_own_play_what_the_team_plays_and_all_that_is_reported_is_expl
 #[test]
 fn a_run_has_the_same_bits_on_any_number_of_threads_and_after_a_restoration() {
     let world = world(&OPEN);
-    let settings = [SMALL, "shards = 3"];
-    let mut whole = Run::new(&world, &Jal, settings, 1);
-    let mut threads = Run::new(&world, &Jal, settings, 3);
-    for _ in 0..2 {
-        assert_eq!(whole.update(), threads.update());
-    }
-    let stored = Stored(whole.algorithm.state());
-    assert_eq!(threads.algorithm.state(), stored.0);
-    let mut resumed = Run::new(&world, &Jal, settings, 2);
-    resumed.algorithm.restore(&stored).unwrap();
-    resumed.episodes = whole.episodes;
-    assert_eq!(whole.update(), resumed.update());
-    assert_eq!(whole.algorithm.state(), resumed.algorithm.state());
+    assert_repeats(&world, &Jal, [SMALL, "shards = 3"]);
 }
 
 #[test]

@@ -4,16 +4,18 @@
 mod support;
 
 use mackrl::{
-    Error, Stopwatch,
-    algorithms::{AlgorithmKind, Ippo, MackrlPpo, Mappo},
+    Error, Real, Stopwatch,
+    algorithms::{
+        Algorithm, AlgorithmKind, Ippo, MackrlPpo, Mappo, Ppo, PpoSettings, Sight, Weighed,
+    },
     common_knowledge::CommonKnowledgeFeatures,
-    experience::PlaySettings,
-    hierarchy::{FactorWorkspace, HierarchySettings, NetworkStyle, Weighing},
+    experience::{Piece, PlaySettings},
+    hierarchy::{Factor, FactorTerm, FactorWorkspace, HierarchySettings, NetworkStyle, Weighing},
     partition::PartitionSchedule,
     policy::{Behaviour, Declaration, Memory, Parameters, Recording, Selection},
 };
 use support::{
-    learner::{Run, Stored, tensors},
+    learner::{Run, Stored, assert_repeats, tensors},
     team::{Team, keys, world},
 };
 
@@ -94,11 +96,16 @@ fn groups_together_are_the_marginal_of_the_team() {
                 .map(|factor| weights[factor.episode][factor.step])
                 .collect();
             let mut gradient = vec![0.0; parameters.values().len()];
+            let term = FactorTerm {
+                factors: &factors,
+                d_log_q_i: &d,
+                entropy_weight: (exploration == 0.0).then_some(0.0),
+            };
             let entropy = team.hierarchy.backward_factors(
                 &parameters,
                 experience,
                 activations,
-                (&factors, &d, 0.0),
+                &[term],
                 &mut FactorWorkspace::default(),
                 &mut gradient,
             );
@@ -133,11 +140,16 @@ fn the_gradient_of_the_entropy_is_that_of_the_networks() {
         let factors = team.hierarchy.factors(experience, Weighing::Choosing);
         let d = vec![0.0; factors.len()];
         let mut gradient = vec![0.0; values.len()];
+        let term = FactorTerm {
+            factors: &factors,
+            d_log_q_i: &d,
+            entropy_weight: Some(1.0),
+        };
         let entropy = team.hierarchy.backward_factors(
             &parameters,
             experience,
             activations,
-            (&factors, &d, 1.0),
+            &[term],
             &mut FactorWorkspace::default(),
             &mut gradient,
         );
@@ -159,6 +171,116 @@ fn the_gradient_of_the_entropy_is_that_of_the_networks() {
             "{place}: {found} {slope}"
         );
     }
+}
+
+/// What the private loss adds to the gradient, against the formula: with values of 0 and without discounting what comes later, an
+/// advantage is the reward, normalised over living agents.
+#[test]
+fn the_private_loss_trains_agents_as_if_their_pairs_had_delegated() {
+    let team = round_robin("env.map=3m", 1, Memory::WhileFormed);
+    let prior = team.world.prior();
+    let settings = PpoSettings {
+        critic_hidden: 3,
+        gamma: 0.0,
+        epochs: 1,
+        environments: 4,
+        shards: 1,
+        ..PpoSettings::default()
+    };
+    let mut collector = team.collector(4, 1);
+    let mut gradient_with = |private: f64| {
+        let own = mackrl::algorithms::Team {
+            spec: team.world.spec(),
+            prior: &prior,
+            seed: 1,
+            threads: 1,
+        };
+        let weighed = Weighed {
+            private,
+            ..Weighed::default()
+        };
+        let hierarchy = team.hierarchy.clone();
+        let mut learner = Ppo::new(hierarchy, settings.clone(), weighed, Sight::State, own);
+        let mut state = learner.state();
+        for (layout, values) in &mut state.tensors {
+            if layout.tensors()[0].name.starts_with("critic.") {
+                values.fill(0.0);
+            }
+        }
+        learner.restore(&Stored(state)).unwrap();
+        let parameters = Parameters::new(learner.parameters().values().to_vec());
+        let play = PlaySettings {
+            behaviour: Behaviour::sampled(0.0),
+            recording: Recording::ForLearning,
+        };
+        collector.play(&parameters, &keys(4), play).unwrap();
+        let mut batch: Vec<_> = collector.pieces().collect();
+        let learnt = learner.learn(&mut batch, &mut Stopwatch::default());
+        learnt.unwrap();
+        let piece = collector.pieces().next().unwrap();
+        let expected = literal_private_gradient(&team, &parameters, piece);
+        (learner.gradient().to_vec(), expected)
+    };
+    let (without, expected) = gradient_with(0.0);
+    let (with, _) = gradient_with(0.5);
+    let largest = expected.iter().fold(0.0_f32, |most, x| most.max(x.abs()));
+    assert!(largest > 0.0);
+    for ((with, without), expected) in with.iter().zip(&without).zip(&expected) {
+        let found = with - without;
+        assert!(
+            (found - 0.5 * expected).abs() < 1e-4 * largest,
+            "{found} {expected}"
+        );
+    }
+}
+
+/// `−1/choices Σ π_a π_b / q · A (∇ log π_a + ∇ log π_b)` over the pairs that could act jointly, A being the normalised reward.
+fn literal_private_gradient(team: &Team, parameters: &Parameters, piece: &mut Piece) -> Vec<f32> {
+    let mut choices = Vec::new();
+    for episode in &piece.experience.episodes {
+        for (reward, alive) in episode.reward_t.iter().zip(&episode.alive_t) {
+            choices.extend(alive.iter().map(|_| f64::from(*reward)));
+        }
+    }
+    let count = choices.len() as f64;
+    let mean = choices.iter().sum::<f64>() / count;
+    let variance = choices.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count;
+    let networks = team.hierarchy.networks(parameters, piece);
+    let (experience, activations) = networks.expect("a piece of this team");
+    let mut factors = Vec::new();
+    let mut d = Vec::new();
+    for factor in team.hierarchy.factors(experience, Weighing::Choosing) {
+        let Some(members) = factor.apart() else {
+            continue;
+        };
+        let log_q = |factors: &[Factor]| {
+            let mut log_q = Vec::new();
+            team.hierarchy.log_q(activations, factors, &mut log_q);
+            log_q.iter().map(|x| f64::from(*x)).sum::<f64>()
+        };
+        let ratio = (log_q(&members) - log_q(&[factor])).exp();
+        let reward = f64::from(experience.episodes[factor.episode].reward_t[factor.step]);
+        let advantage = (reward - mean) / (variance.sqrt() + 1e-5);
+        for member in members {
+            factors.push(member);
+            d.push(f32::from_f64(-ratio * advantage / count));
+        }
+    }
+    let term = FactorTerm {
+        factors: &factors,
+        d_log_q_i: &d,
+        entropy_weight: None,
+    };
+    let mut gradient = vec![0.0; parameters.values().len()];
+    team.hierarchy.backward_factors(
+        parameters,
+        experience,
+        activations,
+        &[term],
+        &mut FactorWorkspace::default(),
+        &mut gradient,
+    );
+    gradient
 }
 
 #[test]
@@ -204,10 +326,12 @@ fn ratios_are_those_to_what_acted() {
 #[test]
 fn a_run_has_the_same_bits_on_any_number_of_threads_and_after_a_restoration() {
     let world = world(&["env.map=3m"]);
-    let kinds: [(&dyn AlgorithmKind, &str); 6] = [
+    let kinds: [(&dyn AlgorithmKind, &str); 8] = [
         (&MackrlPpo, "shards = 3"),
         (&MackrlPpo, "shards = 4\nminibatches = 3"),
         (&MackrlPpo, "partitions = \"all\""),
+        (&MackrlPpo, "levels = \"fours\""),
+        (&MackrlPpo, "private_weight = 0.5"),
         (&MackrlPpo, "hold_steps_env = 0\ngroups = \"formed\""),
         (
             &Mappo::default(),
@@ -216,20 +340,7 @@ fn a_run_has_the_same_bits_on_any_number_of_threads_and_after_a_restoration() {
         (&Ippo::default(), ""),
     ];
     for (kind, settings) in kinds {
-        let mut whole = Run::new(&world, kind, [SMALL, settings], 1);
-        let mut threads = Run::new(&world, kind, [SMALL, settings], 3);
-        let initial = whole.algorithm.parameters().values().to_vec();
-        for _ in 0..2 {
-            assert_eq!(whole.update(), threads.update());
-        }
-        assert_ne!(whole.algorithm.parameters().values(), initial);
-        let stored = Stored(whole.algorithm.state());
-        assert_eq!(threads.algorithm.state(), stored.0, "{}", kind.name());
-        let mut resumed = Run::new(&world, kind, [SMALL, settings], 2);
-        resumed.algorithm.restore(&stored).unwrap();
-        resumed.episodes = whole.episodes;
-        assert_eq!(whole.update(), resumed.update());
-        assert_eq!(whole.algorithm.state(), resumed.algorithm.state());
+        assert_repeats(&world, kind, [SMALL, settings]);
     }
 }
 
@@ -267,6 +378,7 @@ fn agents_on_their_own_play_what_a_trained_team_plays() {
         "hold_steps_env = 3",
         "hold_steps_env = 0",
         "pair_memory = \"episode\"",
+        "levels = \"fours\"",
     ] {
         let mut run = Run::new(&world, &MackrlPpo, [SMALL, settings], 1);
         run.update();

@@ -217,9 +217,9 @@ mod tests {
                 .unwrap();
             let base = base.set("env.map=2s3z").unwrap();
             let config = base.build().unwrap();
-            // What is varied is the hierarchy of pairs.
-            let levels = config.get("algorithm.levels");
-            if levels != Some("pairs".into()) {
+            // What is varied is the hierarchy of pairs under the paper's learner.
+            let varied = ["algorithm.name", "algorithm.levels"].map(|key| config.get(key));
+            if varied != ["mackrl", "pairs"].map(|value| Some(value.into())) {
                 continue;
             }
             presets += 1;

@@ -34,7 +34,7 @@ pub use iql::{Iql, Unmixed};
 pub use jal::{Jal, JalSettings};
 pub use mackrl::{Levels, Mackrl, MackrlSettings, PartitionChoice};
 pub use ppo::{
-    Groups, Ippo, MackrlPpo, MackrlPpoSettings, Mappo, PairMemory, Ppo, PpoSettings, Sight,
+    Groups, Ippo, MackrlPpo, MackrlPpoSettings, Mappo, PairMemory, Ppo, PpoSettings, Sight, Weighed,
 };
 pub use q_learning::{
     ActionValues, Decomposition, QLearner, QLearningSettings, ValueDecomposition,

@@ -7,6 +7,7 @@ use mackrl_env::EpisodeKey;
 
 use super::{
     ChoiceCritic, ChoiceCriticSettings, ChoiceRows, CriticReport, CriticState, choices::chosen,
+    write_along_members,
 };
 use crate::{
     NotFinite,
@@ -202,21 +203,14 @@ impl MemberCritic {
         }
         self.target_r.clear();
         self.target_r.resize(chosen_r.len(), 0.0);
-        let (mut value_t, mut return_t) = (Vec::new(), Vec::new());
-        for (b, episode) in episodes.iter().enumerate() {
-            for member in 0..members {
-                let row = |t: usize| rows.row([b, t], member, members);
-                value_t.clear();
-                value_t.extend((0..episode.steps()).map(|t| chosen_r[row(t)]));
-                value_t.push(0.0);
-                return_t.clear();
-                return_t.resize(episode.steps(), 0.0);
-                lambda_returns(returns, &episode.reward_t, &value_t, &mut return_t);
-                for (t, &return_) in return_t.iter().enumerate() {
-                    self.target_r[row(t)] = return_;
-                }
-            }
-        }
+        write_along_members(
+            episodes.iter().copied(),
+            members,
+            |step, member| rows.row(step, member, members),
+            |row| chosen_r[row],
+            |reward_t, value_t, return_t| lambda_returns(returns, reward_t, value_t, return_t),
+            &mut self.target_r,
+        );
     }
 }
 

@@ -53,17 +53,44 @@ pub enum Weighing {
     Formed,
 }
 
+/// What some choices add to a loss: `Σ_i d_log_q_i log q_i`, and their entropy.
+#[derive(Debug, Clone, Copy)]
+pub struct FactorTerm<'a> {
+    /// The choices.
+    pub factors: &'a [Factor],
+    /// The derivative of the loss with respect to the log q of each.
+    pub d_log_q_i: &'a [f32],
+    /// The derivative of the loss with respect to `Σ_i H(q_i)`; none where the entropy is not asked for.
+    pub entropy_weight: Option<f32>,
+}
+
 /// Rows of the networks to go through again: the numbers between passes, kept to save allocation.
 #[derive(Debug, Clone, Default)]
 pub struct FactorWorkspace {
     log_q: Vec<f32>,
     pair: Vec<f32>,
+    first: Vec<f32>,
+    second: Vec<f32>,
 }
 
 impl Factor {
     /// The members.
     pub fn members(&self) -> impl Iterator<Item = usize> {
         [Some(self.first), self.second].into_iter().flatten()
+    }
+
+    /// What each member of a pair did, as if it had been alone.
+    #[must_use]
+    pub fn apart(&self) -> Option<[Self; 2]> {
+        let second = self.second?;
+        Some([0, 1].map(|place| Self {
+            first: [self.first, second][place],
+            second: None,
+            pair_row: NONE,
+            rows: [self.rows[place], NONE],
+            actions: [self.actions[place], 0],
+            ..*self
+        }))
     }
 }
 
@@ -246,20 +273,21 @@ impl Hierarchy {
         }));
     }
 
-    /// Adds the gradient of `Σ_i d_log_q_i log q_i + entropy_weight Σ_i H(q_i)` to `gradient`, and gives `Σ_i H(q_i)`. The
-    /// activations are used up. Where exploration is mixed into choices, it is part of q, whose entropy is not computed then: 0.
+    /// Adds the gradient of the sum of `terms` to `gradient`, and gives `Σ_i H(q_i)` of those whose entropy is asked for. The
+    /// activations are used up.
     ///
     /// # Shapes
-    /// `d_log_q_i` as `factors`, `gradient` as the layout.
+    /// The derivatives of a term as its factors, `gradient` as the layout.
     ///
     /// # Panics
-    /// If the activations are spent or belong to other parameters, or if the entropy of choices that explore has a weight.
+    /// If the activations are spent or belong to other parameters; where exploration is mixed into choices, if there is not just one
+    /// term, or if its entropy is asked for.
     pub fn backward_factors(
         &self,
         parameters: &Parameters,
         experience: &Experience,
         activations: &mut Activations,
-        (factors, d_log_q_i, entropy_weight): (&[Factor], &[f32], f32),
+        terms: &[FactorTerm<'_>],
         workspace: &mut FactorWorkspace,
         gradient: &mut [f32],
     ) -> f64 {
@@ -267,17 +295,8 @@ impl Hierarchy {
             activations.serve(parameters.version()),
             "activations are those of these parameters, and unspent"
         );
-        assert_eq!(
-            factors.len(),
-            d_log_q_i.len(),
-            "a derivative of each factor"
-        );
         let mut banks = activations.banks.iter().flatten();
         let explores = banks.any(|bank| bank.epsilon > 0.0);
-        assert!(
-            !explores || entropy_weight == 0.0,
-            "no weight of the entropy of choices that explore"
-        );
         let parts = &*self.parts;
         let alone = parts.declaration.alone();
         for own in activations.banks.iter_mut().flatten() {
@@ -286,43 +305,25 @@ impl Hierarchy {
         let (before, rest) = activations.banks.split_at_mut(alone);
         let agents = rest[0].as_mut().expect("agents have controllers");
         let mut pairs = before.get_mut(PAIRS).and_then(Option::as_mut);
-        let columns = agents.law().columns;
         let mut entropy = 0.0;
-        let mut second_gradient = vec![0.0; columns];
-        let mut first_gradient = vec![0.0; columns];
-        for (factor, &weight) in factors.iter().zip(d_log_q_i) {
+        for term in terms {
+            assert_eq!(
+                term.factors.len(),
+                term.d_log_q_i.len(),
+                "a derivative of each factor"
+            );
             if explores {
-                write_explored(pairs.as_deref_mut(), agents, factor, weight);
-                continue;
+                let plain = terms.len() == 1 && term.entropy_weight.is_none();
+                assert!(
+                    plain,
+                    "one term of choices that explore, without their entropy"
+                );
+                for (factor, &weight) in term.factors.iter().zip(term.d_log_q_i) {
+                    write_explored(pairs.as_deref_mut(), agents, factor, weight);
+                }
+            } else {
+                entropy += add_term(pairs.as_deref_mut(), agents, term, workspace);
             }
-            let weights = [weight, entropy_weight];
-            let place = |row: usize| row * columns..(row + 1) * columns;
-            if factor.second.is_none() {
-                let row = place(factor.rows[0]);
-                let own = [
-                    &agents.softmax_rc[row.clone()],
-                    &agents.log_p_rc[row.clone()],
-                ];
-                let to = &mut agents.trace.all_logits_gradient_mut()[row];
-                entropy += f64::from(gradient_alone(own, factor.actions[0], weights, to));
-                continue;
-            }
-            let pairs = pairs.as_deref_mut().expect("a pair has a controller");
-            let width = pairs.law().columns;
-            workspace.pair.resize(width, 0.0);
-            let to = PairGradient {
-                pair: &mut workspace.pair,
-                first: &mut first_gradient,
-                second: &mut second_gradient,
-            };
-            let rows = pair_rows(pairs, agents, factor);
-            let own = rows.gradient(factor.actions, weights, &mut workspace.log_q, to);
-            entropy += f64::from(own);
-            let row = factor.pair_row * width..(factor.pair_row + 1) * width;
-            pairs.trace.all_logits_gradient_mut()[row].copy_from_slice(&workspace.pair);
-            let to = agents.trace.all_logits_gradient_mut();
-            to[place(factor.rows[0])].copy_from_slice(&first_gradient);
-            to[place(factor.rows[1])].copy_from_slice(&second_gradient);
         }
         let weights = parts.weights(parameters);
         for (level, own) in activations.banks.iter_mut().enumerate() {
@@ -352,6 +353,62 @@ impl Parts {
     }
 }
 
+/// Adds the gradient of a term with respect to the logits of its factors' rows, and gives its entropy if it is asked for. No
+/// exploration is mixed in.
+fn add_term(
+    mut pairs: Option<&mut BankActivations>,
+    agents: &mut BankActivations,
+    term: &FactorTerm<'_>,
+    workspace: &mut FactorWorkspace,
+) -> f64 {
+    let FactorWorkspace {
+        log_q,
+        pair,
+        first,
+        second,
+    } = workspace;
+    let columns = agents.law().columns;
+    first.resize(columns, 0.0);
+    second.resize(columns, 0.0);
+    let mut entropy = 0.0;
+    for (factor, &weight) in term.factors.iter().zip(term.d_log_q_i) {
+        let weights = [weight, term.entropy_weight.unwrap_or(0.0)];
+        let own = if factor.second.is_none() {
+            let own = row(agents, factor.rows[0]);
+            let own = gradient_alone(own, factor.actions[0], weights, first);
+            add_to_logits(agents, factor.rows[0], first);
+            own
+        } else {
+            let pairs = pairs.as_deref_mut().expect("a pair has a controller");
+            pair.resize(pairs.law().columns, 0.0);
+            let to = PairGradient {
+                pair,
+                first,
+                second,
+            };
+            let rows = pair_rows(pairs, agents, factor);
+            let own = rows.gradient(factor.actions, weights, log_q, to);
+            add_to_logits(pairs, factor.pair_row, pair);
+            add_to_logits(agents, factor.rows[0], first);
+            add_to_logits(agents, factor.rows[1], second);
+            own
+        };
+        if term.entropy_weight.is_some() {
+            entropy += f64::from(own);
+        }
+    }
+    entropy
+}
+
+/// Adds to the gradient with respect to a row's logits.
+fn add_to_logits(bank: &mut BankActivations, row: usize, gradient: &[f32]) {
+    let columns = bank.law().columns;
+    let to = &mut bank.trace.all_logits_gradient_mut()[row * columns..(row + 1) * columns];
+    for (to, gradient) in to.iter_mut().zip(gradient) {
+        *to += gradient;
+    }
+}
+
 /// Writes the gradient of `weight · log q` with respect to the logits of a factor's rows, into whose choices exploration is mixed.
 fn write_explored(
     pairs: Option<&mut BankActivations>,
@@ -374,20 +431,22 @@ fn write_explored(
     agents.write_row_gradient(factor.rows[1], &[(b, delegated)]);
 }
 
+/// The probabilities of a row, and their logarithms.
+fn row(bank: &BankActivations, row: usize) -> [&[f32]; 2] {
+    let columns = bank.law().columns;
+    let place = row * columns..(row + 1) * columns;
+    [&bank.softmax_rc[place.clone()], &bank.log_p_rc[place]]
+}
+
 /// The rows of a pair and its members.
 fn pair_rows<'a>(
     pairs: &'a BankActivations,
     agents: &'a BankActivations,
     factor: &Factor,
 ) -> PairRows<'a, f32> {
-    let of = |bank: &'a BankActivations, row: usize| {
-        let columns = bank.law().columns;
-        let place = row * columns..(row + 1) * columns;
-        [&bank.softmax_rc[place.clone()], &bank.log_p_rc[place]]
-    };
     PairRows {
-        pair: of(pairs, factor.pair_row),
-        first: of(agents, factor.rows[0]),
-        second: of(agents, factor.rows[1]),
+        pair: row(pairs, factor.pair_row),
+        first: row(agents, factor.rows[0]),
+        second: row(agents, factor.rows[1]),
     }
 }

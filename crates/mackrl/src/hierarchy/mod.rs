@@ -35,7 +35,7 @@ use mackrl_env::{AgentId, EnvironmentSpec, EpisodeKey, PriorKnowledge, Stream};
 
 pub use self::{
     activations::Activations,
-    factors::{Factor, FactorWorkspace, Weighing},
+    factors::{Factor, FactorTerm, FactorWorkspace, Weighing},
 };
 use self::{actor::TeamActor, bank::Bank, executor::AgentExecutor};
 use crate::{

@@ -157,3 +157,34 @@ pub(crate) fn tensors(state: &AlgorithmState, name: &str) -> Vec<f32> {
         .flat_map(|(_, values)| values.to_vec())
         .collect()
 }
+
+/// Asserts that a run has the same bits on any number of threads and after a restoration, and that it changes all that it learns.
+pub(crate) fn assert_repeats(world: &RunWorld, kind: &dyn AlgorithmKind, settings: [&str; 2]) {
+    let named = format!("{}: {}", kind.name(), settings[1]);
+    let [mut whole, mut threads, mut resumed] =
+        [1, 3, 2].map(|threads| Run::new(world, kind, settings, threads));
+    let initial = whole.algorithm.state();
+    for _ in 0..2 {
+        assert_eq!(whole.update(), threads.update(), "{named}");
+    }
+    let stored = Stored(whole.algorithm.state());
+    assert_eq!(threads.algorithm.state(), stored.0, "{named}");
+    for (layout, before) in &initial.tensors {
+        let name = &layout.tensors()[0].name;
+        let (_, after) = (stored.0.tensors.iter())
+            .find(|(own, _)| own.tensors() == layout.tensors())
+            .expect("a learner keeps its tensors");
+        assert!(
+            name.starts_with("target.") || before != after,
+            "{named}: {name}"
+        );
+    }
+    resumed.algorithm.restore(&stored).expect("its own state");
+    resumed.episodes = whole.episodes;
+    assert_eq!(whole.update(), resumed.update(), "{named}");
+    assert_eq!(
+        whole.algorithm.state(),
+        resumed.algorithm.state(),
+        "{named}"
+    );
+}

@@ -18,6 +18,7 @@ use crate::{
     },
     critics::{
         ChoiceCritic, ChoiceRows, CriticReport, MemberCritic, MemberCriticSettings, MemberRows,
+        write_along_members,
     },
     experience::{Episode, Piece},
     hierarchy::{Hierarchy, Weighing},
@@ -214,21 +215,17 @@ impl<J: Judge> Groupwise<J> {
         let members = self.spec.agents;
         self.advantage_r.clear();
         self.advantage_r.resize(self.rows.rows.len(), 0.0);
-        let (mut value_t, mut advantage_t) = (Vec::new(), Vec::new());
-        for (b, episode) in episodes.iter().enumerate() {
-            for member in 0..members {
-                let row = |t: usize| self.rows.row([b, t], member, members);
-                value_t.clear();
-                value_t.extend((0..episode.steps()).map(|t| self.value_rc[row(t)]));
-                value_t.push(0.0);
-                advantage_t.clear();
-                advantage_t.resize(episode.steps(), 0.0);
-                generalised_advantages(returns, &episode.reward_t, &value_t, &mut advantage_t);
-                for (t, &advantage) in advantage_t.iter().enumerate() {
-                    self.advantage_r[row(t)] = advantage;
-                }
-            }
-        }
+        let (rows, value_rc) = (&self.rows, &self.value_rc);
+        write_along_members(
+            episodes.iter().copied(),
+            members,
+            |step, member| rows.row(step, member, members),
+            |row| value_rc[row],
+            |reward_t, value_t, advantage_t| {
+                generalised_advantages(returns, reward_t, value_t, advantage_t);
+            },
+            &mut self.advantage_r,
+        );
     }
 
     /// Computes the gradient of the loss into the first shard's, and gives the loss and the mean advantage.

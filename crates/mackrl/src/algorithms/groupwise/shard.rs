@@ -4,7 +4,7 @@ use super::{Advantage, reading::Choices};
 use crate::{
     Error, NotFinite,
     experience::Piece,
-    hierarchy::{FactorWorkspace, Hierarchy},
+    hierarchy::{FactorTerm, FactorWorkspace, Hierarchy},
     nn::first_not_finite,
     objectives::policy_gradient,
     policy::Parameters,
@@ -101,11 +101,16 @@ impl Shard {
             &weights,
             &mut d_log_q,
         );
+        let term = FactorTerm {
+            factors,
+            d_log_q_i: &d_log_q[0],
+            entropy_weight: None,
+        };
         hierarchy.backward_factors(
             parameters,
             experience,
             activations,
-            (factors, &d_log_q[0], 0.0),
+            &[term],
             &mut self.workspace,
             &mut self.gradient,
         );

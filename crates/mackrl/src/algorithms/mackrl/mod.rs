@@ -4,7 +4,7 @@ mod settings;
 
 use mackrl_env::{
     EnvironmentSpec,
-    settings::{Setting, SettingsError, WrongSetting},
+    settings::{Setting, SettingsError},
 };
 
 use crate::{
@@ -72,18 +72,8 @@ impl AlgorithmKind for Mackrl {
     ) -> Result<toml::Table, SettingsError> {
         let (settings, learning) = Self::read(table)?;
         learning.check()?;
-        if settings.levels == Levels::Fours {
-            return settings.check_fours(table, spec);
-        }
-        match settings.partitions.expected_of(spec.agents) {
-            None => Ok(table.clone()),
-            Some(expected) => Err(SettingsError::Wrong(WrongSetting {
-                name: "partitions".to_owned(),
-                found: format!("\"{}\"", settings.partitions),
-                expected: format!("{expected} for the {} agents of {}", spec.agents, spec.name),
-                nearest: None,
-            })),
-        }
+        settings.check(spec)?;
+        Ok(table.clone())
     }
 
     fn build(&self, table: &toml::Table, team: Team<'_>) -> Result<Box<dyn Algorithm>, Error> {

@@ -51,26 +51,39 @@ declare_settings! {
     }
 }
 
-impl MackrlSettings {
-    /// Checks what fours ask of a team.
-    pub(super) fn check_fours(
-        &self,
-        table: &toml::Table,
-        spec: &EnvironmentSpec,
-    ) -> Result<toml::Table, SettingsError> {
+impl Levels {
+    /// Checks that the team of `spec` has them.
+    ///
+    /// # Errors
+    /// [`SettingsError::Wrong`] if it is too large for fours.
+    pub(in crate::algorithms) fn check(self, spec: &EnvironmentSpec) -> Result<(), SettingsError> {
         let most = PartitionSchedule::MOST_AGENTS_ENUMERATED;
-        if spec.agents <= most {
-            return Ok(table.clone());
+        if self == Self::Pairs || spec.agents <= most {
+            return Ok(());
         }
         Err(SettingsError::Wrong(WrongSetting {
             name: "levels".to_owned(),
-            found: "\"fours\"".to_owned(),
+            found: format!("\"{}\"", self.word()),
             expected: format!(
                 "\"pairs\" for the {} agents of {}: only teams of at most {most} divide into fours",
                 spec.agents, spec.name
             ),
             nearest: None,
         }))
+    }
+}
+
+impl MackrlSettings {
+    /// Checks that the team of `spec` has the groups that these ask for.
+    ///
+    /// # Errors
+    /// As [`Levels::check`] and [`PartitionChoice::check`].
+    pub(super) fn check(&self, spec: &EnvironmentSpec) -> Result<(), SettingsError> {
+        self.levels.check(spec)?;
+        match self.levels {
+            Levels::Pairs => self.partitions.check(spec),
+            Levels::Fours => Ok(()),
+        }
     }
 
     /// The hierarchy of a team of N agents with A actions each; sampled partitions are drawn from `seed`.
@@ -114,8 +127,24 @@ impl PartitionChoice {
         pattern: Some("^(all|round-robin|sampled:[1-9][0-9]{0,3})$"),
     };
 
+    /// Checks that the team of `spec` has these partitions.
+    ///
+    /// # Errors
+    /// [`SettingsError::Wrong`] if it has not.
+    pub(in crate::algorithms) fn check(self, spec: &EnvironmentSpec) -> Result<(), SettingsError> {
+        let Some(expected) = self.expected_of(spec.agents) else {
+            return Ok(());
+        };
+        Err(SettingsError::Wrong(WrongSetting {
+            name: "partitions".to_owned(),
+            found: format!("\"{self}\""),
+            expected: format!("{expected} for the {} agents of {}", spec.agents, spec.name),
+            nearest: None,
+        }))
+    }
+
     /// What could be chosen instead, if a team of so many agents has not the partitions that this asks for.
-    pub(crate) fn expected_of(self, agents: usize) -> Option<String> {
+    fn expected_of(self, agents: usize) -> Option<String> {
         match self {
             Self::All if agents > PartitionSchedule::MOST_AGENTS_ENUMERATED => {
                 Some("`round-robin` or `sampled:K`".to_owned())

@@ -9,7 +9,7 @@ use std::ops::Range;
 use mackrl_env::{EpisodeKey, Stream};
 
 use super::{
-    PpoSettings, Sight,
+    PpoSettings, Sight, Weighed,
     memory::{Epoch, Memory, Rule, Sums, mean_and_deviation, works},
     metrics::METRICS,
 };
@@ -21,7 +21,7 @@ use crate::{
     },
     critics::{ReturnScale, TeamCritic, TeamCriticSettings},
     experience::Piece,
-    hierarchy::{Hierarchy, Weighing},
+    hierarchy::Hierarchy,
     nn::{Optimiser, ParameterLayout, finite_step, first_not_finite},
     parallel::for_each_in_parallel,
     policy::{Behaviour, Parameters, Policy, Tally},
@@ -31,7 +31,7 @@ use crate::{
 #[derive(Debug)]
 pub struct Ppo {
     settings: PpoSettings,
-    weighing: Weighing,
+    weighed: Weighed,
     agents: usize,
     threads: usize,
     hierarchy: Hierarchy,
@@ -50,7 +50,7 @@ impl Ppo {
     pub fn new(
         hierarchy: Hierarchy,
         settings: PpoSettings,
-        weighing: Weighing,
+        weighed: Weighed,
         sight: Sight,
         team: Team<'_>,
     ) -> Self {
@@ -58,7 +58,7 @@ impl Ppo {
         let critic_settings = critic_settings(&settings, sight, team);
         let critic_key = EpisodeKey::new(team.seed, Stream::Other, 1);
         Self {
-            weighing,
+            weighed,
             agents: team.spec.agents,
             threads: team.threads,
             optimiser: Optimiser::new(PpoSettings::OPTIMISER, parameters.len()),
@@ -90,37 +90,18 @@ impl Ppo {
         self.memories.first().map_or(&[], |memory| &memory.gradient)
     }
 
-    /// Takes other parameters of the policy and of the critic, for a test that compares two learners.
-    ///
-    /// # Panics
-    /// If there are not as many.
-    pub fn set_parameters(&mut self, policy: Vec<f32>, critic: &[f32]) {
-        assert_eq!(policy.len(), self.parameters.values().len(), "parameters");
-        self.parameters = Parameters::new(policy);
-        self.critic.load(critic, ReturnScale::default());
-    }
-
-    /// The parameters of the critic.
-    #[must_use]
-    pub fn critic_parameters(&self) -> &[f32] {
-        self.critic.parameters()
-    }
-
     /// Finds values, advantages, groups and the probabilities under which they acted, and gives the sums over the batch.
     fn prepare(&mut self, batch: &mut [&mut Piece]) -> Result<Sums, Error> {
         self.memories.resize_with(batch.len(), Memory::default);
         let (hierarchy, critic, parameters) = (&self.hierarchy, &self.critic, &self.parameters);
         let (settings, critic_settings) = (&self.settings, self.critic_settings);
-        let weighing = hierarchy.factorises().then_some(self.weighing);
+        let weighed = self.weighed;
         let mut work = works(batch, &mut self.memories);
         for_each_in_parallel(self.threads, &mut work, |work| {
             let experience = &work.piece.experience;
             work.memory
                 .prepare(critic, critic_settings, experience, hierarchy, settings);
-            if let Some(weighing) = weighing {
-                work.memory.factors = hierarchy.factors(experience, weighing);
-            }
-            let acted = work.memory.recall(hierarchy, parameters, work.piece);
+            let acted = (work.memory).recall(hierarchy, parameters, work.piece, weighed);
             work.outcome = acted.map(|()| Epoch::default());
         });
         for work in work {
@@ -146,7 +127,7 @@ impl Ppo {
         for (memory, piece) in self.memories.iter_mut().zip(batch) {
             memory.normalise(scale, [mean, deviation]);
             if factorises {
-                memory.weigh_factors(self.agents);
+                memory.weigh_factors(self.agents, Real::from_f64(self.weighed.private));
             } else {
                 memory.weigh_teams(&piece.experience, self.agents);
             }
@@ -246,7 +227,7 @@ impl Algorithm for Ppo {
             for start in (0..batch.len()).step_by(size) {
                 let pieces = start..batch.len().min(start + size);
                 let choices = self.memories[pieces.clone()].iter();
-                let choices: usize = choices.map(|memory| memory.advantage_i.len()).sum();
+                let choices: usize = choices.map(|memory| memory.choices.advantage_i.len()).sum();
                 if choices == 0 {
                     continue;
                 }

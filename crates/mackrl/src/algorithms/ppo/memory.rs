@@ -1,13 +1,11 @@
 //! What an update knows of each piece of its batch: values, advantages, the groups' choices, and the gradients of an epoch.
 
-use mackrl_env::AgentId;
-
-use super::PpoSettings;
+use super::{PpoSettings, Weighed};
 use crate::{
     Error, Real,
-    critics::{TeamCritic, TeamCriticSettings, ValueInputs},
+    critics::{TeamCritic, TeamCriticSettings, ValueInputs, write_along_members},
     experience::{Episode, Experience, Piece},
-    hierarchy::{Activations, Factor, FactorWorkspace, Hierarchy},
+    hierarchy::{Activations, Factor, FactorTerm, FactorWorkspace, Hierarchy},
     nn::ValueTrace,
     objectives::{ReturnSettings, Surrogate, clipped_surrogate, generalised_advantages},
     policy::{Parameters, Tally},
@@ -28,15 +26,23 @@ pub(super) struct Memory {
     pub(super) advantage_sn: Vec<f32>,
     /// Which agents lived \[steps · N\].
     pub(super) alive_sn: Vec<bool>,
-    /// The choices that are weighed by themselves; none where they are those of the whole team.
+    /// The choices of groups, or of the whole team, which have no factor.
+    pub(super) choices: Choices,
+    /// What members of pairs that choose did, as if each had been alone; none unless these have a weight.
+    pub(super) apart: Choices,
+    pub(super) gradient: Vec<f32>,
+    pub(super) critic_gradient: Vec<f32>,
+    pub(super) health: Tally,
+}
+
+/// Choices that are weighed by themselves, and what is known of each.
+#[derive(Debug, Default)]
+pub(super) struct Choices {
     pub(super) factors: Vec<Factor>,
     pub(super) advantage_i: Vec<f32>,
     pub(super) old_log_q_i: Vec<f32>,
     pub(super) log_q_i: Vec<f32>,
     pub(super) d_log_q_i: Vec<f32>,
-    pub(super) gradient: Vec<f32>,
-    pub(super) critic_gradient: Vec<f32>,
-    pub(super) health: Tally,
 }
 
 /// A piece of a batch with what is known of it.
@@ -99,28 +105,30 @@ impl Memory {
             lambda: settings.lambda,
         };
         let rows = self.value_sn.len();
-        for numbers in [&mut self.return_sn, &mut self.advantage_sn] {
-            numbers.clear();
-            numbers.resize(rows, 0.0);
-        }
+        let (inputs, value_sn) = (&self.inputs, &self.value_sn);
+        let row = |[b, t]: [usize; 2], member: usize| inputs.row(b, t, members) + member;
+        let value = |row: usize| mean + deviation * value_sn[row];
+        self.advantage_sn.clear();
+        self.advantage_sn.resize(rows, 0.0);
+        write_along_members(
+            &experience.episodes,
+            members,
+            row,
+            value,
+            |reward_t, value_t, advantage_t| {
+                generalised_advantages(returns, reward_t, value_t, advantage_t);
+            },
+            &mut self.advantage_sn,
+        );
+        self.return_sn.clear();
+        let advantages = self.advantage_sn.iter().enumerate();
+        (self.return_sn).extend(advantages.map(|(row, advantage)| advantage + value(row)));
         self.alive_sn.clear();
         self.alive_sn.resize(rows, false);
-        let (mut value_t, mut advantage_t) = (Vec::new(), Vec::new());
         for (b, episode) in experience.episodes.iter().enumerate() {
-            let steps = episode.steps();
-            let first = self.inputs.row(b, 0, members);
-            for member in 0..members {
-                let row = |t: usize| first + t * members + member;
-                value_t.clear();
-                value_t.extend((0..steps).map(|t| mean + deviation * self.value_sn[row(t)]));
-                value_t.push(0.0);
-                advantage_t.clear();
-                advantage_t.resize(steps, 0.0);
-                generalised_advantages(returns, &episode.reward_t, &value_t, &mut advantage_t);
-                for (t, &advantage) in advantage_t.iter().enumerate() {
-                    self.advantage_sn[row(t)] = advantage;
-                    self.return_sn[row(t)] = advantage + value_t[t];
-                    self.alive_sn[row(t)] = episode.alive_t[t].contains(AgentId::new(member));
+            for (t, alive) in episode.alive_t.iter().enumerate() {
+                for agent in alive.iter() {
+                    self.alive_sn[row([b, t], agent.index())] = true;
                 }
             }
         }
@@ -156,46 +164,80 @@ impl Memory {
         }
     }
 
-    /// The advantage of each group: the mean of its members'.
-    pub(super) fn weigh_factors(&mut self, agents: usize) {
-        self.advantage_i.clear();
-        self.advantage_i.extend(self.factors.iter().map(|factor| {
-            let row = self.inputs.row(factor.episode, factor.step, agents);
-            let first = self.advantage_sn[row + factor.first];
-            factor.second.map_or(first, |second| {
-                0.5 * (first + self.advantage_sn[row + second])
-            })
+    /// The advantage of each group: the mean of its members'. That of a member apart is its own, times `private_weight` and how much
+    /// likelier (or less) both members would have done the same if their pair had delegated: `π_a π_b / q`. So on average over what
+    /// pairs do, members learn what they would if pairs always delegated.
+    pub(super) fn weigh_factors(&mut self, agents: usize, private_weight: f32) {
+        let (inputs, advantage_sn) = (&self.inputs, &self.advantage_sn);
+        let of = |factor: &Factor, member: usize| {
+            advantage_sn[inputs.row(factor.episode, factor.step, agents) + member]
+        };
+        let Choices {
+            factors,
+            advantage_i,
+            old_log_q_i,
+            ..
+        } = &mut self.choices;
+        advantage_i.clear();
+        advantage_i.extend(factors.iter().map(|factor| {
+            let first = of(factor, factor.first);
+            factor
+                .second
+                .map_or(first, |second| 0.5 * (first + of(factor, second)))
         }));
+        let pairs = factors.iter().zip(old_log_q_i);
+        let pairs = pairs.filter(|(factor, _)| factor.second.is_some());
+        let apart = &mut self.apart;
+        apart.advantage_i.clear();
+        let members = apart.factors.chunks_exact(2);
+        let members = members.zip(apart.old_log_q_i.chunks_exact(2));
+        for ((_, log_q), (members, log_p)) in pairs.zip(members) {
+            let weight = private_weight * (log_p[0] + log_p[1] - *log_q).exp();
+            let own = members.iter().map(|own| weight * of(own, own.first));
+            apart.advantage_i.extend(own);
+        }
     }
 
     /// The advantage of each joint action of the whole team: the mean of its living members'.
     pub(super) fn weigh_teams(&mut self, experience: &Experience, agents: usize) {
-        self.advantage_i.clear();
+        let advantage_i = &mut self.choices.advantage_i;
+        advantage_i.clear();
         for (b, episode) in experience.episodes.iter().enumerate() {
             for t in 0..episode.steps() {
                 let row = self.inputs.row(b, t, agents);
                 let living = (row..row + agents).filter(|&row| self.alive_sn[row]);
                 let count = living.clone().count().max(1);
                 let sum: f32 = living.map(|row| self.advantage_sn[row]).sum();
-                self.advantage_i.push(sum / count as f32);
+                advantage_i.push(sum / count as f32);
             }
         }
     }
 
-    /// Recalls the log q under which the piece was played, and whether the controllers read their input.
+    /// Finds the groups that choose, and recalls the log q under which the piece was played, and whether the controllers read their
+    /// input.
     pub(super) fn recall(
         &mut self,
         hierarchy: &Hierarchy,
         parameters: &Parameters,
         piece: &mut Piece,
+        weighed: Weighed,
     ) -> Result<(), Error> {
+        let (choices, apart) = (&mut self.choices, &mut self.apart);
         let activations = if hierarchy.factorises() {
-            let (_, activations) = hierarchy.networks(parameters, piece)?;
-            hierarchy.log_q(activations, &self.factors, &mut self.old_log_q_i);
+            let (experience, activations) = hierarchy.networks(parameters, piece)?;
+            choices.factors = hierarchy.factors(experience, weighed.groups);
+            apart.factors.clear();
+            if weighed.private > 0.0 {
+                let members = choices.factors.iter().filter_map(Factor::apart);
+                apart.factors.extend(members.flatten());
+            }
+            for own in [choices, apart] {
+                hierarchy.log_q(activations, &own.factors, &mut own.old_log_q_i);
+            }
             activations
         } else {
             let (_, activations) = hierarchy.evaluate(parameters, piece)?;
-            flatten(activations.log_p_bt(), &mut self.old_log_q_i);
+            flatten(activations.log_p_bt(), &mut choices.old_log_q_i);
             activations
         };
         self.health = Tally::default();
@@ -245,17 +287,18 @@ impl Memory {
             ..
         } = rule;
         let (experience, activations) = hierarchy.networks(parameters, piece)?;
-        hierarchy.log_q(activations, &self.factors, &mut self.log_q_i);
-        let surrogate = self.surrogate(rule);
+        let (choices, apart) = (&mut self.choices, &mut self.apart);
+        for own in [&mut *choices, &mut *apart] {
+            hierarchy.log_q(activations, &own.factors, &mut own.log_q_i);
+        }
+        let mut surrogate = choices.surrogate(rule);
+        surrogate.loss += apart.surrogate(rule).loss;
+        let entropy_weight = -rule.weights[0] * rule.entropy_weight;
         let entropy = hierarchy.backward_factors(
             parameters,
             experience,
             activations,
-            (
-                &self.factors,
-                &self.d_log_q_i,
-                -rule.weights[0] * rule.entropy_weight,
-            ),
+            &[choices.term(Some(entropy_weight)), apart.term(None)],
             &mut self.workspace,
             &mut self.gradient,
         );
@@ -275,15 +318,16 @@ impl Memory {
         } = rule;
         let (experience, activations): (&Experience, &mut Activations) =
             hierarchy.evaluate(parameters, piece)?;
-        flatten(activations.log_p_bt(), &mut self.log_q_i);
-        let surrogate = self.surrogate(rule);
+        let choices = &mut self.choices;
+        flatten(activations.log_p_bt(), &mut choices.log_q_i);
+        let surrogate = choices.surrogate(rule);
         let bonus = rule.weights[0] * rule.entropy_weight;
         let mut entropy = 0.0;
-        for (d_log_q, &log_q) in self.d_log_q_i.iter_mut().zip(&self.log_q_i) {
+        for (d_log_q, &log_q) in choices.d_log_q_i.iter_mut().zip(&choices.log_q_i) {
             *d_log_q += bonus * log_q;
             entropy -= f64::from(log_q);
         }
-        let mut rest = self.d_log_q_i.as_slice();
+        let mut rest = choices.d_log_q_i.as_slice();
         let steps = experience.episodes.iter().map(Episode::steps);
         let d_log_p_bt: Vec<Vec<f32>> = steps
             .map(|steps| {
@@ -301,7 +345,9 @@ impl Memory {
         );
         Ok((surrogate, entropy))
     }
+}
 
+impl Choices {
     /// The surrogate under the present log q.
     fn surrogate(&mut self, rule: Rule<'_>) -> Surrogate {
         clipped_surrogate(
@@ -310,6 +356,15 @@ impl Memory {
             [&self.log_q_i, &self.old_log_q_i, &self.advantage_i],
             &mut self.d_log_q_i,
         )
+    }
+
+    /// What they add to the loss.
+    fn term(&self, entropy_weight: Option<f32>) -> FactorTerm<'_> {
+        FactorTerm {
+            factors: &self.factors,
+            d_log_q_i: &self.d_log_q_i,
+            entropy_weight,
+        }
     }
 }
 

@@ -4,7 +4,7 @@
 pub(super) const METRICS: &[(&str, &str)] = &[
     (
         "pg_loss",
-        "clipped surrogate loss, without the entropy; mean over epochs, as all of these unless something else is said",
+        "clipped surrogate loss, the private loss included, without the entropy; mean over epochs, as all of these unless something else is said",
     ),
     (
         "agent_grad_norm",

@@ -37,7 +37,7 @@ pub use settings::{Groups, MackrlPpoSettings, PairMemory, PpoSettings};
 use crate::{
     Error,
     algorithms::{
-        Algorithm, AlgorithmKind, PartitionChoice, Preset, Team,
+        Algorithm, AlgorithmKind, Preset, Team,
         shared_settings::{defaults_of_both, read_both},
     },
     common_knowledge::CommonKnowledgeFeatures,
@@ -75,6 +75,15 @@ pub trait Values: std::fmt::Debug + Send + Sync + Default {
     const SUMMARY: &'static str;
     /// What its values read.
     const SIGHT: Sight;
+}
+
+/// What the clipped surrogate is of.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Weighed {
+    /// Which pairs are weighed as one.
+    pub groups: Weighing,
+    /// What the choices of a pair's members, as if each had been alone, weigh beside the pair's.
+    pub private: f64,
 }
 
 /// What values read beside what the agent reads.
@@ -132,14 +141,14 @@ impl AlgorithmKind for MackrlPpo {
         spec: &EnvironmentSpec,
     ) -> Result<toml::Table, SettingsError> {
         let (settings, learning) = Self::read(table)?;
-        settings.check(spec.agents, &spec.name)?;
+        settings.check(spec)?;
         learning.check()?;
         Ok(table.clone())
     }
 
     fn build(&self, table: &toml::Table, team: Team<'_>) -> Result<Box<dyn Algorithm>, Error> {
-        let (hierarchy, settings, weighing) = parts(table, team)?;
-        let learner = Ppo::new(hierarchy, settings, weighing, Sight::State, team);
+        let (hierarchy, settings, weighed) = parts(table, team)?;
+        let learner = Ppo::new(hierarchy, settings, weighed, Sight::State, team);
         Ok(Box::new(learner))
     }
 
@@ -184,7 +193,7 @@ impl<V: Values> AlgorithmKind for AgentsAlone<V> {
 
     fn build(&self, table: &toml::Table, team: Team<'_>) -> Result<Box<dyn Algorithm>, Error> {
         let (hierarchy, settings) = alone(table, team)?;
-        let learner = Ppo::new(hierarchy, settings, Weighing::Choosing, V::SIGHT, team);
+        let learner = Ppo::new(hierarchy, settings, Weighed::default(), V::SIGHT, team);
         Ok(Box::new(learner))
     }
 
@@ -195,33 +204,23 @@ impl<V: Values> AlgorithmKind for AgentsAlone<V> {
 }
 
 /// The declared hierarchy, how it learns, and what is weighed by itself.
-fn parts(table: &toml::Table, team: Team<'_>) -> Result<(Hierarchy, PpoSettings, Weighing), Error> {
+fn parts(table: &toml::Table, team: Team<'_>) -> Result<(Hierarchy, PpoSettings, Weighed), Error> {
     let (settings, learning) = MackrlPpo::read(table).map_err(Error::setting)?;
-    let sizes = [team.spec.agents, team.spec.actions];
-    let schedule = settings.partitions.into();
-    let mut declaration = Declaration::pairwise(
-        sizes,
-        schedule,
-        settings.selector,
-        settings.delegation,
-        team.seed,
-    )?;
-    if settings.partitions == PartitionChoice::RoundRobin {
-        let hold = usize::try_from(settings.hold_steps_env).unwrap_or(usize::MAX);
-        declaration = declaration.with_partitions_held(hold, settings.pair_memory.into());
-    }
-    declaration = declaration.with_delegation_logit(settings.delegation_logit);
+    let declaration = settings.declaration([team.spec.agents, team.spec.actions], team.seed)?;
     let own = HierarchySettings {
         common_knowledge: settings.common_knowledge,
         hidden: learning.hidden,
         networks: style(&learning),
     };
     let hierarchy = Hierarchy::new(declaration, team.spec, team.prior, own);
-    let weighing = match settings.groups {
-        Groups::Choosing => Weighing::Choosing,
-        Groups::Formed => Weighing::Formed,
+    let weighed = Weighed {
+        groups: match settings.groups {
+            Groups::Choosing => Weighing::Choosing,
+            Groups::Formed => Weighing::Formed,
+        },
+        private: settings.private_weight,
     };
-    Ok((hierarchy, learning, weighing))
+    Ok((hierarchy, learning, weighed))
 }
 
 /// The hierarchy without upper levels, and how it learns.

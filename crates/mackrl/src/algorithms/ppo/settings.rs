@@ -1,16 +1,17 @@
 //! The settings of the learners with a clipped surrogate.
 
 use mackrl_env::{
-    declare_settings, declare_words,
+    EnvironmentSpec, declare_settings, declare_words,
     settings::{Accepts, EXACT, SettingsError, WrongSetting},
 };
 
 use crate::{
-    algorithms::PartitionChoice,
+    Error,
+    algorithms::{Levels, PartitionChoice},
     common_knowledge::CommonKnowledgeFeatures,
     nn::OptimiserKind,
     objectives::ValueLoss,
-    policy::{Delegation, Memory, Selection},
+    policy::{Declaration, Delegation, Memory, Selection},
 };
 
 declare_words! {
@@ -89,7 +90,10 @@ declare_settings! {
     pub struct MackrlPpoSettings {
         /// Which features of commonly known entities the controllers read: all of them, or those of the authors' code.
         common_knowledge: CommonKnowledgeFeatures = CommonKnowledgeFeatures::Complete, CommonKnowledgeFeatures::ACCEPTS;
-        /// Which partitions into pairs there are. `round-robin` has one in force at a time, so that each group is weighed by itself;
+        /// The levels of groups between the team and single agents: pairs, or fours that divide into pairs, among which controllers choose; for
+        /// at most 8 agents, and the team is weighed as a whole.
+        levels: Levels = Levels::Pairs, Levels::ACCEPTS;
+        /// Which partitions into pairs there are, where the team divides into pairs. `round-robin` has one in force at a time, so that each group is weighed by itself;
         /// the others leave the choice to the pair selector and weigh the team as a whole.
         partitions: PartitionChoice = PartitionChoice::RoundRobin, PartitionChoice::ACCEPTS;
         /// Environment steps for which a partition of `round-robin` stays in force; 0 for the whole episode.
@@ -104,6 +108,9 @@ declare_settings! {
         delegation_logit: f64 = 3.0, Accepts::within(-1000.0, 1000.0);
         /// What is weighed by itself: pairs that commonly know a joint action and single agents, or all pairs that are formed.
         groups: Groups = Groups::Choosing, Groups::ACCEPTS;
+        /// Weight of the private loss, which trains the agents' own controllers while their pairs act jointly, under `round-robin`: what they would learn
+        /// if the pair had delegated. Without it they learn in proportion to delegation.
+        private_weight: f64 = 0.0, Accepts::within(0.0, 100.0);
     }
 }
 
@@ -162,31 +169,54 @@ impl PpoSettings {
 }
 
 impl MackrlPpoSettings {
-    /// Checks what a setting asks of others and of a team of so many agents, called `world`.
-    pub(super) fn check(&self, agents: usize, world: &str) -> Result<(), SettingsError> {
-        if let Some(expected) = self.partitions.expected_of(agents) {
-            return Err(SettingsError::Wrong(WrongSetting {
-                name: "partitions".to_owned(),
-                found: format!("\"{}\"", self.partitions),
-                expected: format!("{expected} for the {agents} agents of {world}"),
-                nearest: None,
-            }));
+    /// Checks what settings ask of each other and of the team of `spec`.
+    pub(super) fn check(&self, spec: &EnvironmentSpec) -> Result<(), SettingsError> {
+        self.levels.check(spec)?;
+        if self.levels == Levels::Pairs {
+            self.partitions.check(spec)?;
         }
-        if self.partitions == PartitionChoice::RoundRobin || self.hold_steps_env == 1 {
-            return Ok(());
+        let [cause, found, needed] = match (self.levels, self.partitions) {
+            (Levels::Pairs, PartitionChoice::RoundRobin) => return Ok(()),
+            (Levels::Pairs, other) => ["partitions", &other.to_string(), "round-robin"],
+            (Levels::Fours, _) => ["levels", self.levels.word(), "pairs"],
+        };
+        let hold = self.hold_steps_env.to_string();
+        let private = format!("{:?}", self.private_weight);
+        for [name, value, without] in [
+            ["hold_steps_env", &hold, "1"],
+            ["private_weight", &private, "0.0"],
+        ] {
+            if value == without {
+                continue;
+            }
+            let kept = format!("{without}, unless algorithm.{cause} is \"{needed}\"");
+            let changed = format!("\"{needed}\", unless algorithm.{name} is {without}");
+            return Err(SettingsError::AtOdds(Box::new([
+                wrong(name, value.to_owned(), &kept),
+                wrong(cause, format!("\"{found}\""), &changed),
+            ])));
         }
-        Err(SettingsError::AtOdds(Box::new([
-            wrong(
-                "hold_steps_env",
-                self.hold_steps_env.to_string(),
-                "1, unless algorithm.partitions is \"round-robin\"",
-            ),
-            wrong(
-                "partitions",
-                format!("\"{}\"", self.partitions),
-                "\"round-robin\", unless algorithm.hold_steps_env is 1",
-            ),
-        ])))
+        Ok(())
+    }
+
+    /// The hierarchy of a team of N agents with A actions each; what is drawn by lot is drawn from `seed`.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if the team is too large for the partitions.
+    pub(super) fn declaration(&self, team: [usize; 2], seed: u64) -> Result<Declaration, Error> {
+        let declaration = match self.levels {
+            Levels::Pairs => {
+                let schedule = self.partitions.into();
+                Declaration::pairwise(team, schedule, self.selector, self.delegation, seed)
+            }
+            Levels::Fours => Declaration::fours(team, self.selector, self.delegation),
+        }?;
+        let declaration = declaration.with_delegation_logit(self.delegation_logit);
+        if declaration.is_fixed() {
+            return Ok(declaration);
+        }
+        let hold = usize::try_from(self.hold_steps_env).unwrap_or(usize::MAX);
+        Ok(declaration.with_partitions_held(hold, self.pair_memory.into()))
     }
 }
 
@@ -211,6 +241,23 @@ fn wrong(name: &str, found: String, expected: &str) -> WrongSetting {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn spec(agents: usize) -> EnvironmentSpec {
+        EnvironmentSpec {
+            name: "some".to_owned(),
+            agents,
+            entities: 2 * agents,
+            entity_features: 3,
+            position_features: 2,
+            actions: 5,
+            observation_size: 8,
+            state_size: 16,
+            episode_limit: 20,
+            distance_scale: 1.0,
+            statistics: Vec::new(),
+            success: None,
+        }
+    }
 
     #[test]
     fn what_has_a_schedule_changes_linearly_and_then_stays() {
@@ -241,16 +288,42 @@ mod tests {
     }
 
     #[test]
-    fn partitions_are_held_only_where_they_take_turns() {
+    fn what_needs_partitions_that_take_turns_is_refused_without_them() {
         let held = MackrlPpoSettings {
             hold_steps_env: 5,
             ..MackrlPpoSettings::default()
         };
-        assert!(held.check(3, "3m").is_ok());
-        let all = MackrlPpoSettings {
-            partitions: PartitionChoice::All,
-            ..held
+        let apart = MackrlPpoSettings {
+            private_weight: 0.5,
+            ..MackrlPpoSettings::default()
         };
-        assert!(all.check(3, "3m").is_err());
+        for (settings, name) in [(held, "hold_steps_env"), (apart, "private_weight")] {
+            assert!(settings.check(&spec(3)).is_ok());
+            let all = MackrlPpoSettings {
+                partitions: PartitionChoice::All,
+                ..settings
+            };
+            let fours = MackrlPpoSettings {
+                levels: Levels::Fours,
+                ..settings
+            };
+            for (settings, cause) in [(all, "partitions"), (fours, "levels")] {
+                let Err(SettingsError::AtOdds(both)) = settings.check(&spec(3)) else {
+                    panic!("{name} with {cause} is accepted");
+                };
+                assert_eq!(both.map(|wrong| wrong.name), [name, cause]);
+            }
+        }
+    }
+
+    #[test]
+    fn only_small_teams_divide_into_fours() {
+        let fours = MackrlPpoSettings {
+            levels: Levels::Fours,
+            ..MackrlPpoSettings::default()
+        };
+        for (agents, fits) in [(8, true), (9, false)] {
+            assert_eq!(fours.check(&spec(agents)).is_ok(), fits, "{agents}");
+        }
     }
 }
