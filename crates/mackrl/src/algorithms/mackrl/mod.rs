@@ -72,7 +72,7 @@ impl AlgorithmKind for Mackrl {
     ) -> Result<toml::Table, SettingsError> {
         let (settings, learning) = Self::read(table)?;
         learning.check()?;
-        settings.check(spec)?;
+        settings.levels.check(settings.partitions, spec)?;
         Ok(table.clone())
     }
 

@@ -52,13 +52,20 @@ declare_settings! {
 }
 
 impl Levels {
-    /// Checks that the team of `spec` has them.
+    /// Checks that the team of `spec` has such groups, and these partitions if it divides into pairs.
     ///
     /// # Errors
-    /// [`SettingsError::Wrong`] if it is too large for fours.
-    pub(in crate::algorithms) fn check(self, spec: &EnvironmentSpec) -> Result<(), SettingsError> {
+    /// [`SettingsError::Wrong`] if it is too large for fours, or has not these partitions.
+    pub(in crate::algorithms) fn check(
+        self,
+        partitions: PartitionChoice,
+        spec: &EnvironmentSpec,
+    ) -> Result<(), SettingsError> {
         let most = PartitionSchedule::MOST_AGENTS_ENUMERATED;
-        if self == Self::Pairs || spec.agents <= most {
+        if self == Self::Pairs {
+            return partitions.check(spec);
+        }
+        if spec.agents <= most {
             return Ok(());
         }
         Err(SettingsError::Wrong(WrongSetting {
@@ -71,33 +78,35 @@ impl Levels {
             nearest: None,
         }))
     }
-}
-
-impl MackrlSettings {
-    /// Checks that the team of `spec` has the groups that these ask for.
-    ///
-    /// # Errors
-    /// As [`Levels::check`] and [`PartitionChoice::check`].
-    pub(super) fn check(&self, spec: &EnvironmentSpec) -> Result<(), SettingsError> {
-        self.levels.check(spec)?;
-        match self.levels {
-            Levels::Pairs => self.partitions.check(spec),
-            Levels::Fours => Ok(()),
-        }
-    }
 
     /// The hierarchy of a team of N agents with A actions each; sampled partitions are drawn from `seed`.
     ///
     /// # Errors
     /// [`Error::Config`] if the team is too large for the partitions.
-    pub fn declaration(&self, team: [usize; 2], seed: u64) -> Result<Declaration, Error> {
-        let declaration = match self.levels {
-            Levels::Pairs => {
-                let schedule = self.partitions.into();
-                Declaration::pairwise(team, schedule, self.selector, self.delegation, seed)
+    pub(in crate::algorithms) fn declaration(
+        self,
+        partitions: PartitionChoice,
+        (selector, delegation): (Selection, Delegation),
+        team: [usize; 2],
+        seed: u64,
+    ) -> Result<Declaration, Error> {
+        match self {
+            Self::Pairs => {
+                Declaration::pairwise(team, partitions.into(), selector, delegation, seed)
             }
-            Levels::Fours => Declaration::fours(team, self.selector, self.delegation),
-        }?;
+            Self::Fours => Declaration::fours(team, selector, delegation),
+        }
+    }
+}
+
+impl MackrlSettings {
+    /// The hierarchy of a team of N agents with A actions each; sampled partitions are drawn from `seed`.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if the team is too large for the partitions.
+    pub fn declaration(&self, team: [usize; 2], seed: u64) -> Result<Declaration, Error> {
+        let how = (self.selector, self.delegation);
+        let declaration = self.levels.declaration(self.partitions, how, team, seed)?;
         Ok(declaration
             .with_exploration(self.exploration_levels)
             .with_delegation_logit(self.delegation_logit))
@@ -131,7 +140,7 @@ impl PartitionChoice {
     ///
     /// # Errors
     /// [`SettingsError::Wrong`] if it has not.
-    pub(in crate::algorithms) fn check(self, spec: &EnvironmentSpec) -> Result<(), SettingsError> {
+    fn check(self, spec: &EnvironmentSpec) -> Result<(), SettingsError> {
         let Some(expected) = self.expected_of(spec.agents) else {
             return Ok(());
         };

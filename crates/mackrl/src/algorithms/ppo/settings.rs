@@ -171,10 +171,7 @@ impl PpoSettings {
 impl MackrlPpoSettings {
     /// Checks what settings ask of each other and of the team of `spec`.
     pub(super) fn check(&self, spec: &EnvironmentSpec) -> Result<(), SettingsError> {
-        self.levels.check(spec)?;
-        if self.levels == Levels::Pairs {
-            self.partitions.check(spec)?;
-        }
+        self.levels.check(self.partitions, spec)?;
         let [cause, found, needed] = match (self.levels, self.partitions) {
             (Levels::Pairs, PartitionChoice::RoundRobin) => return Ok(()),
             (Levels::Pairs, other) => ["partitions", &other.to_string(), "round-robin"],
@@ -204,13 +201,8 @@ impl MackrlPpoSettings {
     /// # Errors
     /// [`Error::Config`] if the team is too large for the partitions.
     pub(super) fn declaration(&self, team: [usize; 2], seed: u64) -> Result<Declaration, Error> {
-        let declaration = match self.levels {
-            Levels::Pairs => {
-                let schedule = self.partitions.into();
-                Declaration::pairwise(team, schedule, self.selector, self.delegation, seed)
-            }
-            Levels::Fours => Declaration::fours(team, self.selector, self.delegation),
-        }?;
+        let how = (self.selector, self.delegation);
+        let declaration = self.levels.declaration(self.partitions, how, team, seed)?;
         let declaration = declaration.with_delegation_logit(self.delegation_logit);
         if declaration.is_fixed() {
             return Ok(declaration);
