@@ -48,7 +48,7 @@ declare_settings! {
         /// Step size of the critic at the first environment step.
         critic_learning_rate: f64 = 5e-4, Accepts::above_within(0.0, 1.0);
         /// Environment steps over which step sizes and the weight of the entropy change linearly to what they are in the end.
-        schedule_steps_env: u64 = 200_000, Accepts::integer(1, EXACT);
+        schedule_steps_env: u64 = 1_000_000, Accepts::integer(1, EXACT);
         /// What both step sizes are multiplied by in the end.
         learning_rate_finish: f64 = 0.3, Accepts::above_within(0.0, 1.0);
         /// Times that a batch is gone through. Activations are computed anew each time, from the first step of each episode to the last.
