@@ -143,6 +143,22 @@ fn the_instruction_set_is_named_wherever_speed_is_told() {
 }
 
 #[test]
+fn settings_that_follow_from_the_map_are_told() {
+    let folder = tempfile::tempdir().expect("a folder for the story");
+    let tell = |line: &str| type_in_with("scalar", line, folder.path());
+    let trained = tell("train --map 5m_vs_6m --steps 1 --set algorithm.clip=0.3");
+    trained.succeeds();
+    let told: Vec<&str> = (trained.stderr.lines())
+        .filter(|line| line.starts_with("algorithm."))
+        .collect();
+    let why = "the team is outnumbered by what else there is";
+    assert_eq!(
+        told,
+        [format!("algorithm.schedule_steps_env = 1000000, as {why}")]
+    );
+}
+
+#[test]
 fn an_unknown_flag_is_a_usage_error() {
     insta::assert_snapshot!(type_in("maps --jsom").fails(2), @r"
     error: unexpected argument '--jsom' found

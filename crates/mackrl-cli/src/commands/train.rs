@@ -55,8 +55,7 @@ pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<()> {
     };
     let threads = args.threads.count();
     let mut progress = RunProgress::new();
-    let why = resolved.origin("algorithm.name");
-    progress.announce(&config, &why, InstructionSet::chosen()?, threads);
+    progress.announce(&resolved, InstructionSet::chosen()?, threads);
     let summary = training_loop::train_from(
         &path,
         &config,

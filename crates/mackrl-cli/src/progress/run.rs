@@ -2,7 +2,7 @@
 
 use mackrl::nn::InstructionSet;
 use mackrl_run::{
-    config::{Config, Origin},
+    config::{Origin, Resolved},
     training_loop::{Observer, Standing},
 };
 
@@ -28,17 +28,17 @@ impl RunProgress {
         }
     }
 
-    /// Tells what learns and why, and what it is computed with, before a run begins.
+    /// Tells what learns and why, what it is computed with, and which settings follow from the world, before a run begins.
     pub(crate) fn announce(
         &self,
-        config: &Config,
-        why: &Origin,
+        resolved: &Resolved,
         instructions: InstructionSet,
         threads: usize,
     ) {
+        let config = resolved.config();
         let s = if threads == 1 { "" } else { "s" };
         let (algorithm, world) = (config.algorithm.name(), printable(config.env.map()));
-        let why = match why {
+        let why = match resolved.origin("algorithm.name") {
             Origin::Preset { name, .. } => format!("preset {name}"),
             other => printable(&other.to_string()),
         };
@@ -46,6 +46,13 @@ impl RunProgress {
             "{algorithm} ({why}) on {world}, computing with {instructions} on {threads} thread{s}"
         );
         self.lines.note(&text);
+        for key in config.keys() {
+            if let (Origin::Automatic { why }, Some(value)) =
+                (resolved.origin(&key), config.get(&key))
+            {
+                self.lines.note(&format!("{key} = {value}, as {why}"));
+            }
+        }
     }
 
     fn show(&mut self, standing: &Standing) {

@@ -435,6 +435,25 @@ fn large_teams_take_turns_unless_something_else_is_asked_for() {
 }
 
 #[test]
+fn outnumbered_teams_take_careful_steps_unless_something_else_is_asked_for() {
+    let learning = |settings: &[&str]| {
+        let builder = builder().preset("default").unwrap();
+        let builder = (settings.iter()).try_fold(builder, |builder, setting| builder.set(setting));
+        let config = builder.unwrap().build().unwrap();
+        ["algorithm.clip", "algorithm.schedule_steps_env"].map(|key| config.get(key).unwrap())
+    };
+    let (usual, careful) = ([0.2.into(), 200_000.into()], [0.1.into(), 1_000_000.into()]);
+    for algorithm in ["mackrl-ppo", "mappo", "ippo"] {
+        let named = format!("algorithm.name={algorithm}");
+        assert_eq!(learning(&[&named, "env.map=8m"]), usual);
+        assert_eq!(learning(&[&named, "env.map=5m_vs_6m"]), careful);
+        assert_eq!(learning(&[&named, "env.map=2m_vs_1z"]), usual);
+    }
+    let asked = learning(&["env.map=5m_vs_6m", "algorithm.clip=0.2"]);
+    assert_eq!(asked, [usual[0].clone(), careful[1].clone()]);
+}
+
+#[test]
 fn numbers_of_single_precision_read_as_they_are_written() {
     let scatter = Config::default().get("env.spawn_scatter");
     assert_eq!(scatter, Some(toml::Value::Float(0.02)));

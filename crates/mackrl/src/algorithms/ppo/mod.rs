@@ -37,7 +37,7 @@ pub use settings::{Groups, MackrlPpoSettings, PairMemory, PpoSettings};
 use crate::{
     Error,
     algorithms::{
-        Algorithm, AlgorithmKind, Preset, Team,
+        Algorithm, AlgorithmKind, Automatic, Preset, Team,
         shared_settings::{defaults_of_both, read_both},
     },
     common_knowledge::CommonKnowledgeFeatures,
@@ -135,6 +135,10 @@ impl AlgorithmKind for MackrlPpo {
         defaults_of_both::<MackrlPpoSettings, PpoSettings>()
     }
 
+    fn automatic(&self, _table: &toml::Table, spec: &EnvironmentSpec) -> Vec<Automatic> {
+        PpoSettings::automatic(spec)
+    }
+
     fn check(
         &self,
         table: &toml::Table,
@@ -180,6 +184,10 @@ impl<V: Values> AlgorithmKind for AgentsAlone<V> {
 
     fn defaults(&self) -> toml::Table {
         PpoSettings::defaults()
+    }
+
+    fn automatic(&self, _table: &toml::Table, spec: &EnvironmentSpec) -> Vec<Automatic> {
+        PpoSettings::automatic(spec)
     }
 
     fn check(

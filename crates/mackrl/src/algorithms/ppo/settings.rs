@@ -7,7 +7,7 @@ use mackrl_env::{
 
 use crate::{
     Error,
-    algorithms::{Levels, PartitionChoice},
+    algorithms::{Automatic, Levels, PartitionChoice},
     common_knowledge::CommonKnowledgeFeatures,
     nn::OptimiserKind,
     objectives::ValueLoss,
@@ -47,8 +47,9 @@ declare_settings! {
         learning_rate: f64 = 5e-4, Accepts::above_within(0.0, 1.0);
         /// Step size of the critic at the first environment step.
         critic_learning_rate: f64 = 5e-4, Accepts::above_within(0.0, 1.0);
-        /// Environment steps over which step sizes and the weight of the entropy change linearly to what they are in the end.
-        schedule_steps_env: u64 = 1_000_000, Accepts::integer(1, EXACT);
+        /// Environment steps over which step sizes and the weight of the entropy change linearly to what they are in the end. Unless set, a
+        /// million where a team is outnumbered.
+        schedule_steps_env: u64 = 200_000, Accepts::integer(1, EXACT);
         /// What both step sizes are multiplied by in the end.
         learning_rate_finish: f64 = 0.3, Accepts::above_within(0.0, 1.0);
         /// Times that a batch is gone through. Activations are computed anew each time, from the first step of each episode to the last.
@@ -57,7 +58,7 @@ declare_settings! {
         /// more, so that there are no more parts than shards.
         minibatches: usize = 1, Accepts::integer(1, 4096);
         /// How far a group's ratio of probabilities may move from 1 before it gains nothing more. Where a ratio is that of the whole
-        /// team, this is divided by the square root of the number of groups.
+        /// team, this is divided by the square root of the number of groups. Unless set, .1 where a team is outnumbered.
         clip: f64 = 0.2, Accepts::above_within(0.0, 1.0);
         /// How far a value may move within an update before its loss stops falling, in standard deviations of returns.
         value_clip: f64 = 0.2, Accepts::above(0.0);
@@ -137,6 +138,19 @@ impl PpoSettings {
 
     fn progress(&self, steps_env: u64) -> f64 {
         (steps_env as f64 / self.schedule_steps_env as f64).min(1.0)
+    }
+
+    /// Smaller and slower steps for a team that is outnumbered: it wins only if it keeps trying for long, and does not have to win soon.
+    pub(super) fn automatic(spec: &EnvironmentSpec) -> Vec<Automatic> {
+        if spec.entities <= 2 * spec.agents {
+            return Vec::new();
+        }
+        let why = "the team is outnumbered by what else there is";
+        let careful = |name, value| Automatic { name, value, why };
+        vec![
+            careful("schedule_steps_env", 1_000_000.into()),
+            careful("clip", 0.1.into()),
+        ]
     }
 
     /// Checks what a setting asks of others.
@@ -265,6 +279,24 @@ mod tests {
             assert!((found - expected).abs() < 1e-12, "{steps}: {found}");
         }
         assert!((settings.entropy_weight_at(500) - 0.02).abs() < 1e-12);
+    }
+
+    #[test]
+    fn teams_that_are_outnumbered_take_smaller_and_slower_steps() {
+        assert_eq!(PpoSettings::automatic(&spec(5)), []);
+        let outnumbered = EnvironmentSpec {
+            entities: 11,
+            ..spec(5)
+        };
+        let careful = PpoSettings::automatic(&outnumbered);
+        let values = careful
+            .iter()
+            .map(|setting| (setting.name, setting.value.clone()));
+        let expected = [
+            ("schedule_steps_env", 1_000_000.into()),
+            ("clip", 0.1.into()),
+        ];
+        assert_eq!(values.collect::<Vec<_>>(), expected);
     }
 
     #[test]
