@@ -144,10 +144,7 @@ fn the_instruction_set_is_named_wherever_speed_is_told() {
 
 #[test]
 fn settings_that_follow_from_the_map_are_told() {
-    let folder = tempfile::tempdir().expect("a folder for the story");
-    let tell = |line: &str| type_in_with("scalar", line, folder.path());
-    let trained = tell("train --map 5m_vs_6m --steps 1 --set algorithm.clip=0.3");
-    trained.succeeds();
+    let trained = type_in("train --map 5m_vs_6m --steps 1 --set algorithm.clip=0.3");
     let told: Vec<&str> = (trained.stderr.lines())
         .filter(|line| line.starts_with("algorithm."))
         .collect();

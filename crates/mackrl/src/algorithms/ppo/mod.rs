@@ -17,7 +17,7 @@
 //! 6. inputs, features and recurrent states normalised by row, without gain and bias of their own; orthogonal initial weights, the
 //!    last layer's times .01; one feature layer before the recurrent unit;
 //! 7. dead agents have no row and no weight in the policy's loss; to the critic they show their identity alone;
-//! 8. Adam with ε = 1e-5, gradients of norm at most 10, step sizes that may fall.
+//! 8. Adam with ε = 1e-5, gradients of norm at most 10, step sizes that fall; smaller and slower steps where a team is outnumbered.
 
 mod learner;
 mod memory;
