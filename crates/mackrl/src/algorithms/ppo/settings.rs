@@ -145,7 +145,7 @@ impl PpoSettings {
         if spec.entities <= 2 * spec.agents {
             return Vec::new();
         }
-        let why = "the team is outnumbered by what else there is";
+        let why = "the team is outnumbered";
         let careful = |name, value| Automatic { name, value, why };
         vec![
             careful("schedule_steps_env", 1_000_000.into()),
