@@ -6,6 +6,12 @@ use proptest::prelude::*;
 use super::*;
 use crate::config::{AlgorithmConfig, STAR_CRAFT};
 
+fn preset_with(name: &str, settings: &[&str]) -> ConfigBuilder {
+    let preset = builder().preset(name).unwrap();
+    let mut settings = settings.iter();
+    (settings.try_fold(preset, |builder, setting| builder.set(setting))).unwrap()
+}
+
 fn builder() -> ConfigBuilder {
     ConfigBuilder::new(&Registry::built_in())
 }
@@ -409,10 +415,7 @@ proptest! {
 #[test]
 fn large_teams_take_turns_unless_something_else_is_asked_for() {
     let partitions = |settings: &[&str]| {
-        let builder = builder().preset("paper").unwrap();
-        let builder = (settings.iter()).try_fold(builder, |builder, setting| builder.set(setting));
-        let builder = builder.unwrap();
-        let resolved = builder.resolve().unwrap();
+        let resolved = preset_with("paper", settings).resolve().unwrap();
         let origin = resolved.origin("algorithm.partitions").to_string();
         (resolved.config().get("algorithm.partitions"), origin)
     };
@@ -437,9 +440,7 @@ fn large_teams_take_turns_unless_something_else_is_asked_for() {
 #[test]
 fn outnumbered_teams_take_careful_steps_unless_something_else_is_asked_for() {
     let learning = |settings: &[&str]| {
-        let builder = builder().preset("default").unwrap();
-        let builder = (settings.iter()).try_fold(builder, |builder, setting| builder.set(setting));
-        let config = builder.unwrap().build().unwrap();
+        let config = preset_with("default", settings).build().unwrap();
         ["algorithm.clip", "algorithm.schedule_steps_env"].map(|key| config.get(key).unwrap())
     };
     let (usual, careful) = ([0.2.into(), 200_000.into()], [0.1.into(), 1_000_000.into()]);
